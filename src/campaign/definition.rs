@@ -1,0 +1,72 @@
+//! What a campaign is asked to do: cases, seed, flight times, variants and modes of interest.
+
+/// How the nozzle flow enters as jet damping.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NozzleJet {
+    /// No nozzle jet damping.
+    Off,
+    /// Equation (13): the part linear in the nozzle length.
+    Linear,
+    /// Exact for a rigid nozzle with straight flow; also damps the nozzle's own rotation.
+    RigidNozzle,
+}
+
+/// Where the gimbal slope comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Slope {
+    /// Improved Virtual Grid, equations (15) to (22).
+    VirtualGrid,
+    /// Rotation of the gimbal grid alone (the classical method).
+    SingleGrid,
+}
+
+/// One way to evaluate a draw; all variants of a run share the draws, so that differences are paired.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Variant {
+    /// Name, `[a-z0-9_]+`.
+    pub name: String,
+    /// Thrust on; off sets R, g0 and the mass flow to zero.
+    pub thrust: bool,
+    /// Case jet damping (14) on.
+    pub case_jet_damping: bool,
+    /// Nozzle jet damping.
+    pub nozzle_jet_damping: NozzleJet,
+    /// Follower thrust on elastic rotation (−Φ_gᵀ R u× Ψ_g η).
+    pub follower_thrust: bool,
+    /// Gimbal slope.
+    pub slope: Slope,
+}
+
+/// A set of cases evaluated in one run; tables hold populations in this order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Population {
+    /// Name, `[a-z0-9_]+`: `nominal`, `dispersed`, a corner's name, or that name and `_dispersed`.
+    pub name: String,
+    /// Number of cases.
+    pub cases: u64,
+    /// Draw keys held at a fixed value: index of the key and value.
+    pub fixed: Vec<(usize, f64)>,
+    /// Whether the keys that are not fixed are drawn; if not they stay nominal.
+    pub drawn: bool,
+}
+
+/// A run definition, validated against its vehicle and dispersion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Definition {
+    /// Name of the run; default folder of the results.
+    pub name: String,
+    /// Seed of every draw.
+    pub seed: u64,
+    /// Populations, `nominal` first, then `dispersed`, then the corners.
+    pub populations: Vec<Population>,
+    /// Flight times, s, ascending.
+    pub flight_times_s: Vec<f64>,
+    /// Variants, in file order.
+    pub variants: Vec<Variant>,
+    /// Names of the modes of interest.
+    pub modes: Vec<String>,
+    /// Per engine of the vehicle, whether it is gimballed (else locked).
+    pub gimballed: Vec<bool>,
+    /// Second-best to best overlap above which a case is followed by homotopy and both poles are stored.
+    pub exchange_ratio: f64,
+}

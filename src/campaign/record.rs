@@ -1,0 +1,164 @@
+//! The record of one case: its draws and what was found, failures included.
+//!
+//! A record is a value; how it is stored is decided in `io`.
+
+use nalgebra::Complex;
+
+/// Why an evaluation failed. An unstable pole is a result, not a failure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum FailureKind {
+    /// A draw is impossible, for instance a negative inertia.
+    Draw,
+    /// The model could not be built from the drawn vehicle.
+    Build,
+    /// The mass matrix is not positive definite.
+    SingularMass,
+    /// The eigen-solver did not converge.
+    NoConvergence,
+    /// A matrix or a pole is not finite.
+    NonFinite,
+    /// A residual or trace check is beyond its bound.
+    Residual,
+    /// A named mode could not be followed from the nominal to the case.
+    IdentityLost,
+    /// The program panicked inside the case.
+    Panic,
+}
+
+impl FailureKind {
+    /// Every kind, in the order of declaration.
+    pub const ALL: [Self; 8] = [
+        Self::Draw,
+        Self::Build,
+        Self::SingularMass,
+        Self::NoConvergence,
+        Self::NonFinite,
+        Self::Residual,
+        Self::IdentityLost,
+        Self::Panic,
+    ];
+
+    /// The word stored in the `status` columns.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Draw => "draw",
+            Self::Build => "build",
+            Self::SingularMass => "singular_mass",
+            Self::NoConvergence => "no_convergence",
+            Self::NonFinite => "non_finite",
+            Self::Residual => "residual",
+            Self::IdentityLost => "identity_lost",
+            Self::Panic => "panic",
+        }
+    }
+}
+
+/// A failed evaluation: its kind and what happened.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{}: {message}", kind.name())]
+pub struct Failure {
+    /// Kind.
+    pub kind: FailureKind,
+    /// Message with the names and numbers involved.
+    pub message: String,
+}
+
+impl Failure {
+    /// A failure of `kind` with a message.
+    pub fn new(kind: FailureKind, message: impl Into<String>) -> Self {
+        Self { kind, message: message.into() }
+    }
+}
+
+/// Which pole of a named mode a row holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Branch {
+    /// The pole identified as the named mode.
+    Primary,
+    /// The pole with which the named mode exchanges character.
+    Partner,
+    /// A pole that belongs to no named mode (stored with `--poles all`).
+    Other,
+}
+
+impl Branch {
+    /// The word stored in the `branch` column.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Primary => "primary",
+            Self::Partner => "partner",
+            Self::Other => "other",
+        }
+    }
+}
+
+/// One pole of one evaluation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pole {
+    /// Index of the named mode in the run definition; `None` for [`Branch::Other`].
+    pub mode: Option<usize>,
+    /// Which pole of the named mode.
+    pub branch: Branch,
+    /// Modal label that the pole carries; `None` where it carries none (an actuator pole).
+    pub label: Option<String>,
+    /// The pole, rad/s, with non-negative imaginary part.
+    pub value: Complex<f64>,
+    /// Two-sided overlap with the nominal pole of the same name, modulus, −; `None` for other poles.
+    pub identity_confidence: Option<f64>,
+    /// Sum of the participation factors of the elastic states, −.
+    pub participation_structure: Option<f64>,
+    /// Sum of the participation factors of the gimbal states, −.
+    pub participation_nozzle: Option<f64>,
+    /// Relative residual of the eigenpair, −; `None` where no vector was computed.
+    pub residual: Option<f64>,
+}
+
+impl Pole {
+    /// Frequency |Im s|/2π, Hz.
+    pub fn frequency_hz(&self) -> f64 {
+        self.value.im.abs() / std::f64::consts::TAU
+    }
+
+    /// Damping ratio −Re s/|s|, −; not finite for a pole at the origin.
+    pub fn damping_ratio(&self) -> f64 {
+        -self.value.re / self.value.norm()
+    }
+
+    /// Time to double ln 2/Re s, s, where Re s > 0.
+    pub fn time_to_double_s(&self) -> Option<f64> {
+        (self.value.re > 0.0).then(|| std::f64::consts::LN_2 / self.value.re)
+    }
+}
+
+/// One evaluation of a case: one variant at one flight time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evaluation {
+    /// Index of the variant in the run definition.
+    pub variant: usize,
+    /// Index of the flight time in the run definition.
+    pub flight_time: usize,
+    /// The poles asked for, named modes first in the order of the run definition, or a failure.
+    pub outcome: Result<Vec<Pole>, Failure>,
+}
+
+/// One case: the draws of one dispersed vehicle and all its evaluations.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// Index of the population in the run's list of populations.
+    pub population: usize,
+    /// Case index inside the population.
+    pub case: u64,
+    /// Drawn value per draw key, in the order of the dispersion's keys.
+    pub values: Vec<f64>,
+    /// Normal score Φ⁻¹(F(x)) per draw key.
+    pub scores: Vec<f64>,
+    /// Evaluations ordered by flight time, then variant.
+    pub evaluations: Vec<Evaluation>,
+}
+
+impl Record {
+    /// The first failure of the case, in the order of its evaluations.
+    pub fn failure(&self) -> Option<&Failure> {
+        self.evaluations.iter().find_map(|e| e.outcome.as_ref().err())
+    }
+}

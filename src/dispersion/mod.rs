@@ -1,0 +1,1 @@
+//! Dispersion: parameters, laws and the draws of a case.

@@ -1,0 +1,1 @@
+//! Dynamics: from one drawn vehicle to one linear model.

@@ -1,0 +1,1 @@
+//! Gates: statistics against limits, with a verdict.

@@ -1,0 +1,1 @@
+//! Input and output: the only module that touches the disk.

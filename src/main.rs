@@ -1,0 +1,5 @@
+//! The `tvse` program.
+
+fn main() -> std::process::ExitCode {
+    tvse::cli::run()
+}

@@ -1,0 +1,1 @@
+//! Modes of a linear model: poles, vectors and their identity.

@@ -1,0 +1,1 @@
+//! Reports: from values to text for people.

@@ -1,0 +1,1 @@
+//! Scenario: from the text of the input files to validated values, with all problems at once.

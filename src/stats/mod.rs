@@ -1,0 +1,1 @@
+//! Statistics of samples: moments, quantiles, proportions and tolerance bounds; knows no rocket.

@@ -1,0 +1,1 @@
+//! A stick model of beams, masses and springs, and its free-free modes.

@@ -1,0 +1,40 @@
+//! The vehicle: validated values, with no randomness, no files and no equations.
+
+pub mod actuator;
+pub mod engine;
+pub mod motor;
+pub mod package;
+
+pub use actuator::{Actuator, Bearing, SecondOrder};
+pub use engine::{Ablation, Engine, Nozzle};
+pub use motor::Motor;
+pub use package::{Grid, MassProperties, Modal, Mode, ModeSet, Parent};
+
+/// Standard gravity, m/s² (CGPM 1901), by which a specific impulse in seconds is defined.
+pub const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
+
+/// A validated vehicle: the modal data of its body and its engines.
+#[derive(Debug, Clone)]
+pub struct Vehicle {
+    /// Name shown wherever results are shown, for instance `SLS-like, synthetic`.
+    pub name: String,
+    /// Structural damping ratio of every mode unless dispersed, −.
+    pub structural_damping: f64,
+    /// Flight time at which the nominal frequency of a label decides its band, s.
+    pub band_time_s: f64,
+    /// Named modes: name, and the labels that carry it; at a flight time the first one present counts.
+    pub named_modes: Vec<NamedMode>,
+    /// Engines in file order.
+    pub engines: Vec<Engine>,
+    /// Modes per flight time.
+    pub modal: Modal,
+}
+
+/// A mode of interest by name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedMode {
+    /// Name, for instance `tvse`.
+    pub name: String,
+    /// Labels of the modal package that carry the name, the first one present at a flight time counts.
+    pub labels: Vec<String>,
+}
