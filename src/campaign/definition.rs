@@ -1,15 +1,6 @@
 //! What a campaign is asked to do: cases, seed, flight times, variants and modes of interest.
 
-/// How the nozzle flow enters as jet damping.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NozzleJet {
-    /// No nozzle jet damping.
-    Off,
-    /// Equation (13): the part linear in the nozzle length.
-    Linear,
-    /// Exact for a rigid nozzle with straight flow; also damps the nozzle's own rotation.
-    RigidNozzle,
-}
+pub use crate::dynamics::NozzleJet;
 
 /// Where the gimbal slope comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

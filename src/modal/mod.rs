@@ -1,1 +1,7 @@
 //! Modes of a linear model: poles, vectors and their identity.
+
+pub mod eigen;
+pub mod identify;
+
+pub use eigen::{Pair, Solver};
+pub use identify::{Candidate, Identity, Reference};

@@ -1,0 +1,64 @@
+//! One drawn vehicle at one flight time: the numbers that enter the equations of motion.
+//!
+//! Where they come from (nominal values and draws) is decided in `campaign`.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// An engine as drawn, ablation and gains applied.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DrawnEngine {
+    /// Thrust R, N.
+    pub thrust_n: f64,
+    /// Mass flow ṁ, kg/s.
+    pub mass_flow_kg_s: f64,
+    /// Moving mass m, kg.
+    pub mass_kg: f64,
+    /// Distance of the cg from the gimbal along the exhaust direction, m.
+    pub cg_m: f64,
+    /// Transverse inertia about the gimbal J_G, kg·m².
+    pub inertia_kg_m2: f64,
+    /// Inertia about the nozzle axis, kg·m².
+    pub axial_inertia_kg_m2: f64,
+    /// Nozzle length L_n, m.
+    pub length_m: f64,
+    /// Stiffness on each gimbal rotation: actuator and, where separate, flex bearing, N·m/rad.
+    pub gimbal_stiffness_n_m_rad: [f64; 2],
+    /// Damping on each gimbal rotation, N·m·s/rad.
+    pub gimbal_damping_n_m_s_rad: [f64; 2],
+    /// Gain on the gimbal shape Φ_g per mode, −.
+    pub shape_gain: Vec<f64>,
+    /// Gain on the gimbal slope Ψ_g per mode, −.
+    pub slope_gain: Vec<f64>,
+}
+
+impl DrawnEngine {
+    /// Transverse inertia about the engine's own cg `J_c = J_G − m r²`, kg·m².
+    pub fn central_inertia_kg_m2(&self) -> f64 {
+        self.inertia_kg_m2 - self.mass_kg * self.cg_m * self.cg_m
+    }
+
+    /// Inertia tensor about the engine's own cg for an axis of symmetry `axis` (unit), kg·m².
+    pub fn central_inertia_tensor(&self, axis: &Vector3<f64>) -> Matrix3<f64> {
+        let along = axis * axis.transpose();
+        along * self.axial_inertia_kg_m2
+            + (Matrix3::identity() - along) * self.central_inertia_kg_m2()
+    }
+}
+
+/// The body as drawn: frequency and damping per mode.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DrawnBody {
+    /// Natural frequency Ω per mode, rad/s.
+    pub frequency_rad_s: Vec<f64>,
+    /// Damping ratio ζ per mode, −.
+    pub damping_ratio: Vec<f64>,
+}
+
+/// A drawn vehicle at one flight time.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DrawnVehicle {
+    /// The body.
+    pub body: DrawnBody,
+    /// Every engine of the vehicle, in its order.
+    pub engines: Vec<DrawnEngine>,
+}

@@ -1,0 +1,313 @@
+//! The eigen-solver: poles of a model by a dense solve, eigenvectors by inverse iteration.
+//!
+//! The only file that names faer's solvers. Mass matrix by Cholesky, Parlett–Reinsch balancing,
+//! Hessenberg QR, all sequential and in buffers that are reused; what poles mean is decided in
+//! `identify`.
+
+use crate::dynamics::Model;
+use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
+use faer::linalg::cholesky::llt;
+use faer::linalg::evd::{self, ComputeEigenvectors, EvdParams};
+use faer::linalg::lu::partial_pivoting as lu;
+use faer::{Conj, Mat, MatMut, MatRef, Par, Spec, c64};
+use nalgebra::DMatrix;
+
+/// Why a solve failed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// An entry of the model or a pole is NaN or infinite.
+    #[error("{0} is not finite")]
+    NonFinite(&'static str),
+    /// The mass matrix is not positive definite.
+    #[error("the mass matrix is not positive definite (pivot {pivot})")]
+    SingularMass {
+        /// Coordinate at which the factorisation stopped.
+        pivot: usize,
+    },
+    /// The QR iteration did not converge.
+    #[error("the QR iteration did not converge")]
+    NoConvergence,
+    /// Sums of the poles disagree with the traces of the matrix.
+    #[error("{what} of the poles is off by {error:.2e}, allowed {bound:.2e}")]
+    Trace {
+        /// Which sum.
+        what: &'static str,
+        /// Relative difference.
+        error: f64,
+        /// Largest relative difference allowed.
+        bound: f64,
+    },
+}
+
+/// A right and a left eigenvector of `L(s) = M s² + D s + K` at a pole: `L x = 0`, `yᴴ L = 0`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pair {
+    /// The pole, rad/s.
+    pub pole: c64,
+    /// Right vector x, unit norm.
+    pub right: Vec<c64>,
+    /// Left vector y, unit norm.
+    pub left: Vec<c64>,
+    /// Root of the sum of squares of ‖L x‖ and ‖yᴴ L‖ over ‖M‖|s|² + ‖D‖|s| + ‖K‖ (Frobenius norms), −.
+    pub residual: f64,
+}
+
+/// Buffers of the solver for models of one size.
+pub struct Solver {
+    coordinates: usize,
+    factor: Mat<f64>,
+    right_side: Mat<f64>,
+    state: DMatrix<f64>,
+    real: Vec<f64>,
+    imaginary: Vec<f64>,
+    pencil: Mat<c64>,
+    permutation: Vec<usize>,
+    inverse_permutation: Vec<usize>,
+    vectors: Mat<c64>,
+    memory: MemBuffer,
+}
+
+/// Allowed relative error of Σλ and Σλ², in units of n ε: the backward error of the balanced QR
+/// iteration is a modest multiple of n ε ‖A‖, and the sums are compared on the scale Σ|λ|, Σ|λ|².
+const TRACE_FACTOR: f64 = 1e4;
+
+impl Solver {
+    /// A solver for models with `coordinates` generalised coordinates.
+    pub fn new(coordinates: usize) -> Self {
+        let states = 2 * coordinates;
+        let requirements = [
+            llt::factor::cholesky_in_place_scratch::<f64>(
+                coordinates,
+                Par::Seq,
+                Spec::<llt::factor::LltParams, f64>::default(),
+            ),
+            llt::solve::solve_in_place_scratch::<f64>(coordinates, states, Par::Seq),
+            evd::evd_scratch::<f64>(
+                states,
+                ComputeEigenvectors::No,
+                ComputeEigenvectors::No,
+                Par::Seq,
+                Spec::<EvdParams, f64>::default(),
+            ),
+            lu::factor::lu_in_place_scratch::<usize, c64>(
+                coordinates,
+                coordinates,
+                Par::Seq,
+                Spec::<lu::factor::PartialPivLuParams, c64>::default(),
+            ),
+            lu::solve::solve_in_place_scratch::<usize, c64>(coordinates, 1, Par::Seq),
+            lu::solve::solve_transpose_in_place_scratch::<usize, c64>(coordinates, 1, Par::Seq),
+        ];
+        Self {
+            coordinates,
+            factor: Mat::zeros(coordinates, coordinates),
+            right_side: Mat::zeros(coordinates, states),
+            state: DMatrix::zeros(states, states),
+            real: vec![0.0; states],
+            imaginary: vec![0.0; states],
+            pencil: Mat::zeros(coordinates, coordinates),
+            permutation: vec![0; coordinates],
+            inverse_permutation: vec![0; coordinates],
+            vectors: Mat::zeros(coordinates, 2),
+            memory: MemBuffer::new(StackReq::any_of(&requirements)),
+        }
+    }
+
+    /// All poles of the model, rad/s, appended to `poles` (cleared first) with each complex pair
+    /// represented by its member in the upper half plane; sorted by imaginary, then real part.
+    ///
+    /// # Errors
+    /// See [`Error`]; poles are checked against the traces of the state matrix and its square.
+    pub fn poles(&mut self, model: &Model, poles: &mut Vec<c64>) -> Result<(), Error> {
+        poles.clear();
+        self.build_state(model)?;
+        let (trace, trace_of_square) = traces(&self.state);
+        nalgebra::linalg::balancing::balance_parlett_reinsch(&mut self.state);
+        if !self.state.iter().all(|v| v.is_finite()) {
+            return Err(Error::NonFinite("the balanced state matrix"));
+        }
+        let states = 2 * self.coordinates;
+        evd::evd_real(
+            MatRef::from_column_major_slice(self.state.as_slice(), states, states),
+            faer::ColMut::from_slice_mut(&mut self.real).as_diagonal_mut(),
+            faer::ColMut::from_slice_mut(&mut self.imaginary).as_diagonal_mut(),
+            None,
+            None,
+            Par::Seq,
+            MemStack::new(&mut self.memory),
+            Spec::<EvdParams, f64>::default(),
+        )
+        .map_err(|_| Error::NoConvergence)?;
+        let all = || self.real.iter().zip(&self.imaginary).map(|(re, im)| c64::new(*re, *im));
+        if !all().all(|s| s.re.is_finite() && s.im.is_finite()) {
+            return Err(Error::NonFinite("a pole"));
+        }
+        let bound = TRACE_FACTOR * states as f64 * f64::EPSILON;
+        let sums = all().fold((0.0, 0.0, 0.0, 0.0), |(a, b, c, d), s| {
+            (a + s.re, b + s.re * s.re - s.im * s.im, c + s.norm(), d + s.norm_sqr())
+        });
+        for (what, error) in [
+            ("the sum", (sums.0 - trace).abs() / sums.2),
+            ("the sum of squares", (sums.1 - trace_of_square).abs() / sums.3),
+        ] {
+            if !(error <= bound) {
+                return Err(Error::Trace { what, error, bound });
+            }
+        }
+        poles.extend(all().filter(|s| s.im >= 0.0));
+        poles.sort_by(|a, b| a.im.total_cmp(&b.im).then(a.re.total_cmp(&b.re)));
+        Ok(())
+    }
+
+    /// The state matrix A of `ẋ = A x`, x = [q, q̇], 2n×2n column-major, in SI units.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn state_matrix(&mut self, model: &Model) -> Result<&DMatrix<f64>, Error> {
+        self.build_state(model)?;
+        Ok(&self.state)
+    }
+
+    /// `A = [[0, 1], [−M⁻¹K, −M⁻¹D]]`.
+    fn build_state(&mut self, model: &Model) -> Result<(), Error> {
+        let n = self.coordinates;
+        assert_eq!(model.coordinates(), n, "the solver was made for another size");
+        if !model.is_finite() {
+            return Err(Error::NonFinite("the model"));
+        }
+        self.factor.copy_from(&model.mass);
+        llt::factor::cholesky_in_place(
+            self.factor.as_mut(),
+            llt::factor::LltRegularization::default(),
+            Par::Seq,
+            MemStack::new(&mut self.memory),
+            Spec::<llt::factor::LltParams, f64>::default(),
+        )
+        .map_err(|error| {
+            let llt::factor::LltError::NonPositivePivot { index } = error;
+            Error::SingularMass { pivot: index }
+        })?;
+        self.right_side.as_mut().subcols_mut(0, n).copy_from(&model.stiffness);
+        self.right_side.as_mut().subcols_mut(n, n).copy_from(&model.damping);
+        llt::solve::solve_in_place(
+            self.factor.as_ref(),
+            self.right_side.as_mut(),
+            Par::Seq,
+            MemStack::new(&mut self.memory),
+        );
+        self.state.fill(0.0);
+        for column in 0..2 * n {
+            if column >= n {
+                self.state[(column - n, column)] = 1.0;
+            }
+            for row in 0..n {
+                self.state[(n + row, column)] = -self.right_side[(row, column)];
+            }
+        }
+        Ok(())
+    }
+
+    /// Right and left eigenvectors at `pole` by inverse iteration on `L(s)`.
+    ///
+    /// For a repeated pole any vector of the eigenspace may come back.
+    pub fn pair(&mut self, model: &Model, pole: c64) -> Pair {
+        let n = self.coordinates;
+        fill_pencil(model, pole, self.pencil.as_mut());
+        let (info, permutation) = lu::factor::lu_in_place(
+            self.pencil.as_mut(),
+            &mut self.permutation,
+            &mut self.inverse_permutation,
+            Par::Seq,
+            MemStack::new(&mut self.memory),
+            Spec::<lu::factor::PartialPivLuParams, c64>::default(),
+        );
+        let _ = info;
+        // At a pole the last pivot is of the order of rounding; an exact zero would divide by it.
+        let scale = (0..n).map(|i| self.pencil[(i, i)].norm()).fold(0.0, f64::max);
+        for i in 0..n {
+            if !(self.pencil[(i, i)].norm() > scale * f64::EPSILON * f64::EPSILON) {
+                self.pencil[(i, i)] = c64::new(scale * f64::EPSILON, 0.0);
+            }
+        }
+        // A start with no structure that could be orthogonal to the vector sought.
+        for row in 0..n {
+            let start = 1.0 + 0.5 * (row as f64 + 1.0).sin();
+            self.vectors[(row, 0)] = c64::new(start, 0.0);
+            self.vectors[(row, 1)] = c64::new(start, 0.0);
+        }
+        for _ in 0..2 {
+            lu::solve::solve_in_place_with_conj(
+                self.pencil.as_ref(),
+                self.pencil.as_ref(),
+                permutation,
+                Conj::No,
+                self.vectors.as_mut().subcols_mut(0, 1),
+                Par::Seq,
+                MemStack::new(&mut self.memory),
+            );
+            lu::solve::solve_transpose_in_place_with_conj(
+                self.pencil.as_ref(),
+                self.pencil.as_ref(),
+                permutation,
+                Conj::Yes,
+                self.vectors.as_mut().subcols_mut(1, 1),
+                Par::Seq,
+                MemStack::new(&mut self.memory),
+            );
+            for column in 0..2 {
+                let norm = self.vectors.col(column).norm_l2();
+                for row in 0..n {
+                    self.vectors[(row, column)] /= norm;
+                }
+            }
+        }
+        let right: Vec<c64> = (0..n).map(|row| self.vectors[(row, 0)]).collect();
+        let left: Vec<c64> = (0..n).map(|row| self.vectors[(row, 1)]).collect();
+        let residual = residual(model, pole, &right, &left);
+        Pair { pole, right, left, residual }
+    }
+}
+
+/// Fills `L(s) = M s² + D s + K`.
+fn fill_pencil(model: &Model, s: c64, mut pencil: MatMut<'_, c64>) {
+    let square = s * s;
+    for column in 0..model.coordinates() {
+        for row in 0..model.coordinates() {
+            let at = (row, column);
+            pencil[at] = square * model.mass[at] + s * model.damping[at] + model.stiffness[at];
+        }
+    }
+}
+
+/// Relative residual of a pair, see [`Pair::residual`].
+fn residual(model: &Model, s: c64, right: &[c64], left: &[c64]) -> f64 {
+    let n = model.coordinates();
+    let mut rows = vec![c64::new(0.0, 0.0); n];
+    let mut columns = vec![c64::new(0.0, 0.0); n];
+    let square = s * s;
+    for column in 0..n {
+        for row in 0..n {
+            let at = (row, column);
+            let entry = square * model.mass[at] + s * model.damping[at] + model.stiffness[at];
+            rows[row] += entry * right[column];
+            columns[column] += left[row].conj() * entry;
+        }
+    }
+    let norm = |v: &[c64]| v.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
+    let scale = model.mass.norm_l2() * square.norm()
+        + model.damping.norm_l2() * s.norm()
+        + model.stiffness.norm_l2();
+    norm(&rows).hypot(norm(&columns)) / scale
+}
+
+/// Trace of the matrix and of its square.
+fn traces(matrix: &DMatrix<f64>) -> (f64, f64) {
+    let n = matrix.nrows();
+    let mut square = 0.0;
+    for i in 0..n {
+        for j in 0..n {
+            square += matrix[(i, j)] * matrix[(j, i)];
+        }
+    }
+    (matrix.trace(), square)
+}

@@ -1,0 +1,419 @@
+//! Identity of modes: which pole of a model is the named mode of another.
+//!
+//! Two models are compared by two-sided overlaps, never by order of frequency. Labels of the
+//! package become nominal poles by continuation; nominal poles become poles of a case by overlap,
+//! or by homotopy where two poles compete.
+
+use super::eigen::{Error, Pair, Solver};
+use crate::dynamics::{Layout, Model};
+use faer::c64;
+
+/// A pole followed so far, with what is needed to find it again in another model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reference {
+    /// The pole with its vectors.
+    pub pair: Pair,
+    /// `yᴴ M`.
+    left_mass: Vec<c64>,
+    /// `yᴴ D`.
+    left_damping: Vec<c64>,
+    /// `yᴴ L'(s) x`, the scale of overlaps.
+    derivative: c64,
+}
+
+/// A pole of a model that overlaps with a reference.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// The pole with its vectors.
+    pub pair: Pair,
+    /// Two-sided overlap `(w₀ᴴ v)(wᴴ v₀) / ((w₀ᴴ v₀)(wᴴ v))` of the state-space vectors, −; over
+    /// all poles of a model, conjugates included, the overlaps add up to one.
+    pub overlap: c64,
+}
+
+/// The poles of a case that carry a named mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identity {
+    /// The pole identified as the mode.
+    pub primary: Candidate,
+    /// The pole with which it exchanges character, where the best two overlaps are comparable.
+    pub partner: Option<Candidate>,
+}
+
+/// Why a mode could not be followed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Lost {
+    /// A solve on the way failed.
+    #[error("{0}")]
+    Solve(#[from] Error),
+    /// No pole overlaps enough with the reference.
+    #[error("the best overlap {best:.3} is below {least}")]
+    Overlap {
+        /// Modulus of the best overlap found.
+        best: f64,
+        /// Least modulus allowed.
+        least: f64,
+    },
+}
+
+/// Overlap below which a pole is not taken for the mode: below it more than two others share it.
+const LEAST_OVERLAP: f64 = 0.2;
+/// A homotopy step is accepted when the best overlap is at least this …
+const STEP_OVERLAP: f64 = 0.9;
+/// … and else halved, down to this fraction of the whole way; there the best is taken.
+const LEAST_STEP: f64 = 1.0 / 256.0;
+/// Candidates are drawn in until the overlaps found leave no more than this unaccounted for.
+const UNACCOUNTED: f64 = 0.05;
+
+impl Reference {
+    /// The reference of a pole of `model`.
+    pub fn new(model: &Model, pair: Pair) -> Self {
+        let n = model.coordinates();
+        let mut left_mass = vec![c64::new(0.0, 0.0); n];
+        let mut left_damping = left_mass.clone();
+        let mut derivative = c64::new(0.0, 0.0);
+        for column in 0..n {
+            for row in 0..n {
+                let left = pair.left[row].conj();
+                left_mass[column] += left * model.mass[(row, column)];
+                left_damping[column] += left * model.damping[(row, column)];
+            }
+            derivative +=
+                (2.0 * pair.pole * left_mass[column] + left_damping[column]) * pair.right[column];
+        }
+        Self { pair, left_mass, left_damping, derivative }
+    }
+
+    /// `w₀ᴴ v` for a state-space vector v = [x, s x]: `y₀ᴴ [(s₀ + s) M₀ + D₀] x`.
+    fn project(&self, pair: &Pair) -> c64 {
+        let sum = self.pair.pole + pair.pole;
+        (self.left_mass.iter().zip(&self.left_damping).zip(&pair.right))
+            .map(|((mass, damping), right)| (sum * mass + damping) * right)
+            .sum()
+    }
+
+    /// Participation factors (state-space, w_i* v_i / wᴴv, real part) summed over the coordinates
+    /// `range` and their rates, −; all coordinates together give one.
+    pub fn participation(&self, range: std::ops::Range<usize>) -> f64 {
+        range
+            .map(|i| {
+                let weight = 2.0 * self.pair.pole * self.left_mass[i] + self.left_damping[i];
+                (weight * self.pair.right[i] / self.derivative).re
+            })
+            .sum()
+    }
+
+    /// Two-sided overlap of this reference with a pole of another model.
+    fn overlap(&self, other: &Reference) -> c64 {
+        self.project(&other.pair) * other.project(&self.pair) / (self.derivative * other.derivative)
+    }
+
+    /// First guess of the same pole in `model`: the root nearest s₀ of `y₀ᴴ L(s) x₀ = 0`.
+    fn predict(&self, model: &Model) -> c64 {
+        let n = model.coordinates();
+        let mut form = [c64::new(0.0, 0.0); 3];
+        for column in 0..n {
+            let right = self.pair.right[column];
+            for row in 0..n {
+                let weight = self.pair.left[row].conj() * right;
+                form[0] += weight * model.stiffness[(row, column)];
+                form[1] += weight * model.damping[(row, column)];
+                form[2] += weight * model.mass[(row, column)];
+            }
+        }
+        let root = (form[1] * form[1] - 4.0 * form[2] * form[0]).sqrt();
+        let roots = [(-form[1] + root) / (2.0 * form[2]), (-form[1] - root) / (2.0 * form[2])];
+        let distance = |s: &c64| (s - self.pair.pole).norm();
+        let best = if distance(&roots[0]) <= distance(&roots[1]) { roots[0] } else { roots[1] };
+        if best.re.is_finite() && best.im.is_finite() { best } else { self.pair.pole }
+    }
+}
+
+/// The poles of `model` that overlap with `reference`, best first; at least one.
+///
+/// Poles are tried from the nearest to the predicted one outwards until the overlaps account for
+/// all but a small rest.
+fn candidates(
+    solver: &mut Solver,
+    model: &Model,
+    poles: &[c64],
+    reference: &Reference,
+) -> Vec<(Candidate, Reference)> {
+    let guess = reference.predict(model);
+    let mut order: Vec<c64> = poles.to_vec();
+    order.sort_by(|a, b| (a - guess).norm().total_cmp(&(b - guess).norm()));
+    let mut found: Vec<(Candidate, Reference)> = Vec::new();
+    let mut rest = c64::new(1.0, 0.0);
+    for pole in order {
+        let pair = solver.pair(model, pole);
+        let other = Reference::new(model, pair.clone());
+        let overlap = reference.overlap(&other);
+        rest -= overlap;
+        let overlap_norm = overlap.norm();
+        if overlap_norm.is_finite() {
+            found.push((Candidate { pair, overlap }, other));
+        }
+        if found.len() >= 2 && rest.norm() <= UNACCOUNTED {
+            break;
+        }
+    }
+    found.sort_by(|a, b| b.0.overlap.norm().total_cmp(&a.0.overlap.norm()));
+    found
+}
+
+/// Follows `reference` from one model to another along a path of models.
+///
+/// `path(t)` fills a model for t in (0, 1]; a step is accepted when one pole keeps at least
+/// [`STEP_OVERLAP`], else it is halved, down to [`LEAST_STEP`], where the best is taken: a mode
+/// crosses others by its vectors, not by its frequency.
+///
+/// # Errors
+/// [`Lost`] where a solve fails or no pole overlaps.
+pub fn follow(
+    solver: &mut Solver,
+    mut reference: Reference,
+    model: &mut Model,
+    mut path: impl FnMut(f64, &mut Model),
+) -> Result<Reference, Lost> {
+    let (mut done, mut step) = (0.0_f64, 1.0_f64);
+    let mut poles = Vec::new();
+    while done < 1.0 {
+        let next = (done + step).min(1.0);
+        path(next, model);
+        solver.poles(model, &mut poles)?;
+        let best = candidates(solver, model, &poles, &reference).swap_remove(0);
+        let overlap = best.0.overlap.norm();
+        if overlap >= STEP_OVERLAP || step <= LEAST_STEP {
+            if !(overlap >= LEAST_OVERLAP) {
+                return Err(Lost::Overlap { best: overlap, least: LEAST_OVERLAP });
+            }
+            reference = best.1;
+            done = next;
+            step *= 2.0;
+        } else {
+            step /= 2.0;
+        }
+    }
+    Ok(reference)
+}
+
+/// Identifies the named mode `reference` of the model `nominal` among the `poles` of `case`.
+///
+/// Where the second-best overlap reaches `exchange_ratio` of the best, the mode is followed by
+/// homotopy from `nominal` to `case` and the other of the two is its partner. `scratch` has the
+/// size of the models.
+///
+/// # Errors
+/// [`Lost`] where no pole overlaps enough or a solve on the way fails.
+pub fn identify(
+    solver: &mut Solver,
+    reference: &Reference,
+    nominal: &Model,
+    case: &Model,
+    poles: &[c64],
+    exchange_ratio: f64,
+    scratch: &mut Model,
+) -> Result<(Identity, Vec<Reference>), Lost> {
+    let mut found = candidates(solver, case, poles, reference).into_iter();
+    let (best, best_reference) =
+        found.next().ok_or(Lost::Overlap { best: 0.0, least: LEAST_OVERLAP })?;
+    let least = best.overlap.norm();
+    if !(least >= LEAST_OVERLAP) {
+        return Err(Lost::Overlap { best: least, least: LEAST_OVERLAP });
+    }
+    let rival = found.next().filter(|(rival, _)| rival.overlap.norm() >= exchange_ratio * least);
+    let Some((rival, rival_reference)) = rival else {
+        return Ok((Identity { primary: best, partner: None }, vec![best_reference]));
+    };
+    let end = follow(solver, reference.clone(), scratch, |t, model| model.blend(nominal, case, t))?;
+    let distance = |candidate: &Candidate| (candidate.pair.pole - end.pair.pole).norm();
+    if distance(&rival) < distance(&best) {
+        let identity = Identity { primary: rival, partner: Some(best) };
+        Ok((identity, vec![rival_reference, best_reference]))
+    } else {
+        let identity = Identity { primary: best, partner: Some(rival) };
+        Ok((identity, vec![best_reference, rival_reference]))
+    }
+}
+
+/// The nominal pole of the elastic coordinate `label`: continuation of a factor 0→1 on engine mass
+/// coupling without thrust and flow, then of a factor 0→1 on thrust and flow.
+///
+/// `model_at(f, model)` fills the nominal model with the factor f on thrust and flow.
+///
+/// # Errors
+/// [`Lost`] where a solve fails or the mode cannot be followed.
+pub fn nominal(
+    solver: &mut Solver,
+    layout: &Layout,
+    coordinate: usize,
+    mut model_at: impl FnMut(f64, &mut Model),
+) -> Result<Reference, Lost> {
+    let size = layout.coordinates();
+    let mut coupled = Model::zeros(size);
+    model_at(0.0, &mut coupled);
+    let mut uncoupled = coupled.clone();
+    for column in 0..size {
+        for row in 0..size {
+            let engine = layout.gimbals().contains(&row) && layout.gimbals().contains(&column);
+            if !engine {
+                let unit = if row == column { 1.0 } else { 0.0 };
+                uncoupled.mass[(row, column)] = unit;
+            }
+        }
+    }
+    let (damping, stiffness) = (
+        uncoupled.damping[(coordinate, coordinate)],
+        uncoupled.stiffness[(coordinate, coordinate)],
+    );
+    // s² + d s + k = 0 of the mode alone.
+    let root = c64::new(damping * damping / 4.0 - stiffness, 0.0).sqrt();
+    let pole = c64::new(-damping / 2.0, 0.0) + root;
+    let mut unit = vec![c64::new(0.0, 0.0); size];
+    unit[coordinate] = c64::new(1.0, 0.0);
+    let pair = Pair { pole, right: unit.clone(), left: unit, residual: 0.0 };
+    let start = Reference::new(&uncoupled, pair);
+    let mut scratch = Model::zeros(size);
+    let with_mass =
+        follow(solver, start, &mut scratch, |t, model| model.blend(&uncoupled, &coupled, t))?;
+    follow(solver, with_mass, &mut scratch, |t, model| model_at(t, model))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two modes and one actuator-like coordinate with a coupling in mass and thrust.
+    fn model(frequencies: [f64; 2], coupling: f64, thrust: f64) -> Model {
+        let mut model = Model::zeros(3);
+        for (i, w) in frequencies.into_iter().enumerate() {
+            model.mass[(i, i)] = 1.0;
+            model.damping[(i, i)] = 2.0 * 0.005 * w;
+            model.stiffness[(i, i)] = w * w;
+            let sign = if i == 0 { 1.0 } else { 0.4 };
+            model.mass[(i, 2)] = coupling * sign;
+            model.mass[(2, i)] = coupling * sign;
+            model.stiffness[(i, 2)] = thrust * sign;
+        }
+        model.mass[(2, 2)] = 1.0;
+        model.damping[(2, 2)] = 2.0 * 0.3 * 1.3;
+        model.stiffness[(2, 2)] = 1.3 * 1.3;
+        model
+    }
+
+    fn reference(model: &Model, near: c64) -> Reference {
+        let mut solver = Solver::new(model.coordinates());
+        let mut poles = Vec::new();
+        solver.poles(model, &mut poles).expect("solved");
+        let pole = *poles
+            .iter()
+            .min_by(|a, b| (*a - near).norm().total_cmp(&(*b - near).norm()))
+            .expect("a pole");
+        let pair = solver.pair(model, pole);
+        Reference::new(model, pair)
+    }
+
+    #[test]
+    fn eigenpairs_have_residuals_of_rounding() {
+        let model = model([1.0, 1.02], 0.1, 0.2);
+        let mut solver = Solver::new(3);
+        let mut poles = Vec::new();
+        solver.poles(&model, &mut poles).expect("solved");
+        for pole in poles {
+            assert!(solver.pair(&model, pole).residual < 1e2 * f64::EPSILON);
+        }
+    }
+
+    #[test]
+    fn overlaps_of_all_poles_and_conjugates_add_up_to_one() {
+        let (a, b) = (model([1.0, 1.02], 0.1, 0.2), model([1.03, 0.99], 0.12, 0.25));
+        let start = reference(&a, c64::new(0.0, 1.0));
+        let mut solver = Solver::new(3);
+        let mut poles = Vec::new();
+        solver.poles(&b, &mut poles).expect("solved");
+        let both = poles.iter().flat_map(|s| [*s, s.conj()]);
+        let sum: c64 = both.map(|s| start.overlap(&Reference::new(&b, solver.pair(&b, s)))).sum();
+        assert!((sum - c64::new(1.0, 0.0)).norm() < 1e-12, "{sum}");
+    }
+
+    #[test]
+    fn participation_of_all_coordinates_is_one() {
+        let start = reference(&model([1.0, 1.02], 0.1, 0.2), c64::new(0.0, 1.0));
+        assert!((start.participation(0..3) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_mode_that_crosses_another_keeps_its_name() {
+        let nominal = model([1.0, 1.05], 1e-3, 0.0);
+        let crossed = model([1.1, 1.05], 1e-3, 0.0);
+        let start = reference(&nominal, c64::new(0.0, 1.0));
+        let mut solver = Solver::new(3);
+        let mut poles = Vec::new();
+        solver.poles(&crossed, &mut poles).expect("solved");
+        let mut scratch = Model::zeros(3);
+        let (identity, _) =
+            identify(&mut solver, &start, &nominal, &crossed, &poles, 0.5, &mut scratch)
+                .expect("found");
+        assert!((identity.primary.pair.pole.im - 1.1).abs() < 1e-3);
+        assert!(identity.primary.overlap.norm() > 0.99);
+        assert!(identity.partner.is_none());
+    }
+
+    #[test]
+    fn modes_that_exchange_character_are_both_kept() {
+        let nominal = model([1.0, 1.2], 0.1, 0.1);
+        let veering = model([1.0, 1.0], 0.1, 0.1);
+        let start = reference(&nominal, c64::new(0.0, 1.0));
+        let mut solver = Solver::new(3);
+        let mut poles = Vec::new();
+        solver.poles(&veering, &mut poles).expect("solved");
+        let mut scratch = Model::zeros(3);
+        let (identity, _) =
+            identify(&mut solver, &start, &nominal, &veering, &poles, 0.05, &mut scratch)
+                .expect("found");
+        assert!(identity.partner.is_some());
+    }
+
+    #[test]
+    fn the_nominal_pole_of_a_label_is_reached_by_continuation() {
+        let layout = Layout::new(["m001", "m002"], [("e.one".to_owned(), ["a", "b"], true)]);
+        // Four coordinates: a second, uncoupled gimbal axis.
+        let fill = |factor: f64, out: &mut Model| {
+            let three = model([1.0, 1.05], 0.2, 0.2 * factor);
+            out.clear();
+            for (to, from) in [
+                (&mut out.mass, &three.mass),
+                (&mut out.damping, &three.damping),
+                (&mut out.stiffness, &three.stiffness),
+            ] {
+                for i in 0..3 {
+                    for j in 0..3 {
+                        to[(i, j)] = from[(i, j)];
+                    }
+                }
+            }
+            out.mass[(3, 3)] = 1.0;
+            out.damping[(3, 3)] = 0.7;
+            out.stiffness[(3, 3)] = 2.0;
+        };
+        let mut solver = Solver::new(4);
+        let found = nominal(&mut solver, &layout, 0, fill).expect("followed");
+        assert!(found.participation(0..1) > 0.5);
+        assert!(
+            (found.participation(layout.elastic()) + found.participation(layout.gimbals()) - 1.0)
+                .abs()
+                < 1e-12
+        );
+    }
+
+    #[test]
+    fn bad_models_are_refused_without_hanging() {
+        let mut solver = Solver::new(3);
+        let mut poles = Vec::new();
+        let mut nan = model([1.0, 1.1], 0.1, 0.1);
+        nan.stiffness[(0, 1)] = f64::NAN;
+        assert_eq!(solver.poles(&nan, &mut poles), Err(Error::NonFinite("the model")));
+        let singular = model([1.0, 1.1], 1.5, 0.1);
+        assert!(matches!(solver.poles(&singular, &mut poles), Err(Error::SingularMass { .. })));
+    }
+}
