@@ -5,6 +5,7 @@ pub mod drawn;
 pub mod jet_damping;
 pub mod layout;
 pub mod model;
+pub mod planar;
 pub mod virtual_grid;
 
 pub use assemble::{Attachment, Effects, NozzleJet, Plant};
