@@ -34,6 +34,25 @@ pub struct Nozzle {
     pub ablation: Option<Ablation>,
 }
 
+impl Nozzle {
+    /// The nozzle after the share `a·b` of the liner loss (ablation factor times burned propellant
+    /// fraction, −); the nozzle itself where it has no ablation.
+    pub fn ablated(&self, share: f64) -> Self {
+        let Some(loss) = self.ablation else { return *self };
+        Self {
+            mass_kg: self.mass_kg - share * loss.mass_loss_kg,
+            cg_m: self.cg_m + share * loss.cg_change_m,
+            inertia_kg_m2: self.inertia_kg_m2 - share * loss.inertia_loss_kg_m2,
+            ..*self
+        }
+    }
+
+    /// Transverse inertia about the nozzle's own cg `J_c = J_G − m r²`, kg·m².
+    pub fn central_inertia_kg_m2(&self) -> f64 {
+        self.inertia_kg_m2 - self.mass_kg * self.cg_m * self.cg_m
+    }
+}
+
 /// One engine of the vehicle.
 #[derive(Debug, Clone)]
 pub struct Engine {
