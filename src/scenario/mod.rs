@@ -3,7 +3,6 @@
 pub mod gimbal;
 pub mod names;
 pub mod pattern;
-pub mod spelling;
 pub mod table;
 pub mod vehicle;
 pub mod vehicle_file;

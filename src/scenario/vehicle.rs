@@ -3,12 +3,12 @@
 //! Types and ranges of single values are checked before, by `table`.
 
 use super::gimbal::{self, Refusal};
-use super::spelling::allowed_instead;
 use super::table::Findings;
 use super::vehicle_file::{ActuatorFile, BearingPart, EngineFile, MotorFile, VehicleFile};
 use super::{names, pattern};
 use crate::dynamics::virtual_grid::Geometry;
 use crate::problem::Problems;
+use crate::spelling::allowed_instead;
 use crate::vehicle::{
     Ablation, Actuator, Bearing, Engine, Modal, ModeSet, Motor, NamedMode, Nozzle, SecondOrder,
     Vehicle,
