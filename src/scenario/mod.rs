@@ -1,5 +1,7 @@
 //! Scenario: from the text of the input files to validated values, with all problems at once.
 
+#[cfg(test)]
+mod fixture;
 pub mod gimbal;
 pub mod names;
 pub mod pattern;

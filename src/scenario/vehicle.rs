@@ -135,6 +135,25 @@ impl<'a> Resolver<'a> {
                 good = false;
             }
         }
+        let users = || self.file.engine.iter().filter(|e| e.motor == file.name);
+        if file.burned_fraction.is_none() && users().any(|e| e.nozzle.ablation.is_some()) {
+            let allowed = "a table, since a nozzle on this motor ablates";
+            self.findings.push(format!("{key}.burned_fraction"), "nothing", allowed);
+        }
+        if let ([first, .., last] | [first @ last], true) = (file.time_s.as_slice(), good) {
+            let times = &self.file.flight_times_s;
+            let outside: Vec<&f64> =
+                times.iter().filter(|t| !(first <= *t && *t <= last)).collect();
+            if !outside.is_empty() && users().next().is_some() {
+                let found = format!("tables from {first} to {last} s, without {outside:?} s");
+                self.findings.push(
+                    format!("{key}.time_s"),
+                    found,
+                    "tables that hold every flight time",
+                );
+                good = false;
+            }
+        }
         good.then(|| Motor {
             name: file.name.clone(),
             specific_impulse_s: file.specific_impulse_s,
@@ -145,7 +164,7 @@ impl<'a> Resolver<'a> {
         })
     }
 
-    /// The motor of an engine; it must cover every flight time.
+    /// The motor of an engine.
     fn motor_of(
         &mut self,
         key: &str,
@@ -158,20 +177,7 @@ impl<'a> Resolver<'a> {
             self.findings.push(format!("{key}.motor"), found, allowed_instead(&file.motor, known));
             return None;
         };
-        if file.nozzle.ablation.is_some() && self.file.motor[index].burned_fraction.is_none() {
-            let allowed = format!("a table, since the nozzle of {key} ablates");
-            self.findings.push(format!("motor[{index}].burned_fraction"), "nothing", allowed);
-        }
-        let motor = motors[index].clone()?;
-        let (first, last) = (motor.time_s[0], motor.time_s[motor.time_s.len() - 1]);
-        for time in &self.file.flight_times_s {
-            if !(first <= *time && *time <= last) {
-                let found = format!("motor \"{}\", whose tables do not hold {time} s", motor.name);
-                let allowed = format!("flight times from {first} to {last} s");
-                self.findings.push(format!("{key}.motor"), found, allowed);
-            }
-        }
-        Some(motor)
+        motors[index].clone()
     }
 
     fn engine(
@@ -511,3 +517,6 @@ impl<'a> Resolver<'a> {
         file.named_mode.iter().map(named).collect()
     }
 }
+
+#[cfg(test)]
+mod tests;
