@@ -1,1 +1,27 @@
-//! Dispersion: parameters, laws and the draws of a case.
+//! Dispersion: what is uncertain about a vehicle, and the draws of a case.
+//!
+//! A [`Table`] (text) meets a vehicle and becomes a [`Dispersion`]: draw keys, each with its
+//! [`Law`] and the [`Parameters`] it acts on. A [`Sampler`] draws a case from it: an [`Affine`]
+//! effect per parameter. A draw is a function of (seed, draw key, case index) and nothing else;
+//! [`stream`] says which.
+
+mod beta;
+pub mod draw;
+#[cfg(test)]
+mod fixture;
+pub mod law;
+pub mod normal;
+pub mod parameter;
+pub mod plan;
+pub mod resolve;
+pub mod sampler;
+pub mod stream;
+pub mod table;
+
+pub use draw::{Dispersion, Draw, Role, Shared};
+pub use law::{Bound, Law, Position};
+pub use parameter::{Affine, Parameters, Place, Quantity};
+pub use plan::Plan;
+pub use resolve::resolve;
+pub use sampler::{Cursor, Draws, Sampler};
+pub use table::{Apply, Table};

@@ -64,7 +64,8 @@ pub fn resolve(
         fixed: Vec::new(),
         drawn,
     };
-    let mut populations = vec![standard(STANDARD[0], 1, false), standard(STANDARD[1], file.cases, true)];
+    let mut populations =
+        vec![standard(STANDARD[0], 1, false), standard(STANDARD[1], file.cases, true)];
     let mut corners = Vec::new();
     for (i, corner) in file.corner.iter().enumerate() {
         let key = format!("corner[{i}]");
@@ -156,7 +157,8 @@ fn modes(file: &RunFile, vehicle: Option<&Resolved>, times: &[f64], f: &mut Find
         let sets = times.iter().filter_map(|t| vehicle.modal.at(*t));
         for set in sets.filter(|set| mode.labels.iter().all(|label| set.mode(label).is_none())) {
             let found = format!("\"{name}\", without a label at {} s", set.flight_time_s);
-            let allowed = "a mode with a label of the modal package at every flight time of the run";
+            let allowed =
+                "a mode with a label of the modal package at every flight time of the run";
             f.push(&key, found, allowed);
         }
     }
@@ -168,7 +170,11 @@ fn gimballed(file: &RunFile, vehicle: Option<&Resolved>, f: &mut Findings) -> Ve
     for (i, entry) in file.gimballed.iter().enumerate() {
         if !paths.iter().any(|path| pattern::matches(entry, path)) {
             let allowed = allowed_instead(entry, paths.iter().map(String::as_str));
-            f.push(format!("gimballed[{i}]"), format!("\"{entry}\", which matches no engine"), allowed);
+            f.push(
+                format!("gimballed[{i}]"),
+                format!("\"{entry}\", which matches no engine"),
+                allowed,
+            );
         }
     }
     let chosen = |path: &String| file.gimballed.iter().any(|entry| pattern::matches(entry, path));
@@ -193,7 +199,8 @@ fn given(
     }
     let Some(dispersion) = dispersion else { return Vec::new() };
     let mut sides: Vec<Option<usize>> = vec![None; dispersion.draws().len()];
-    for (side, (list, entries)) in [("low", &corner.low), ("high", &corner.high)].iter().enumerate() {
+    for (side, (list, entries)) in [("low", &corner.low), ("high", &corner.high)].iter().enumerate()
+    {
         for (i, entry) in entries.iter().enumerate() {
             let place = format!("{key}.{list}[{i}]");
             let mut matched = false;

@@ -17,8 +17,6 @@ pub enum FileKind {
     Dispersion,
     /// A stick model.
     Stick,
-    /// Gates.
-    Gates,
 }
 
 /// The JSON Schema of a kind of file.
@@ -26,8 +24,7 @@ pub fn schema(kind: FileKind) -> Schema {
     match kind {
         FileKind::Vehicle => schemars::schema_for!(VehicleFile),
         FileKind::Run => schemars::schema_for!(RunFile),
-        FileKind::Dispersion => todo!(),
-        FileKind::Stick => todo!(),
-        FileKind::Gates => todo!(),
+        FileKind::Dispersion => schemars::schema_for!(crate::dispersion::Table),
+        FileKind::Stick => schemars::schema_for!(crate::structure::raw::Stick),
     }
 }

@@ -7,7 +7,11 @@
 ///
 /// Every row of the smaller side gets a partner, whatever the score; cost is cubic in the larger
 /// side. Method: H. W. Kuhn (1955), in the form with potentials and one augmenting path a row.
-pub fn assign(rows: usize, columns: usize, score: impl Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
+pub fn assign(
+    rows: usize,
+    columns: usize,
+    score: impl Fn(usize, usize) -> f64,
+) -> Vec<Option<usize>> {
     if rows > columns {
         let mut partner = vec![None; rows];
         for (column, row) in assign(columns, rows, |c, r| score(r, c)).into_iter().enumerate() {

@@ -77,8 +77,7 @@ pub fn free_free(model: &Weighed, limit: f64, count: usize) -> Result<FreeFree, 
         .count();
     // A cluster of eigenvalues is oriented as a whole, even where the count cuts through it.
     let solved = kept + orientation::cut(&mu[kept.saturating_sub(1)..elastic.max(kept)], kept);
-    let mut shapes =
-        Mat::from_fn(n, solved, |i, j| eigen.U()[(i, n - 1 - j)] / mu[j].sqrt());
+    let mut shapes = Mat::from_fn(n, solved, |i, j| eigen.U()[(i, n - 1 - j)] / mu[j].sqrt());
     solve_upper_triangular_in_place(c.transpose(), shapes.as_mut(), Par::Seq);
     let mut omega2: Vec<f64> = mu[..solved].iter().map(|mu| 1.0 / mu).collect();
     for (j, &omega2) in omega2.iter().enumerate() {
@@ -137,9 +136,8 @@ fn greatest_strain(k: MatRef<'_, f64>, shapes: MatRef<'_, f64>) -> f64 {
 /// eigenvalues of K' scaled to a unit diagonal.
 fn mechanism(model: &Weighed, held: MatRef<'_, f64>) -> Error {
     let n = held.nrows();
-    let scale: Vec<f64> = (0..n)
-        .map(|i| if held[(i, i)] > 0.0 { 1.0 / held[(i, i)].sqrt() } else { 1.0 })
-        .collect();
+    let scale: Vec<f64> =
+        (0..n).map(|i| if held[(i, i)] > 0.0 { 1.0 / held[(i, i)].sqrt() } else { 1.0 }).collect();
     let scaled = Mat::from_fn(n, n, |i, j| held[(i, j)] * scale[i] * scale[j]);
     let Ok(eigen) = scaled.self_adjoint_eigen(Side::Lower) else {
         return Error::NoConvergence;

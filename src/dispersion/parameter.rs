@@ -1,0 +1,412 @@
+//! Parameters: the registry of quantities that can be dispersed, and their instances in a vehicle.
+//!
+//! The registry line of a quantity is all there is to say about it: its TOML path, unit, bounds,
+//! Parquet column and report text derive from it. Laws and rows are not known here.
+
+use crate::vehicle::{Modal, Vehicle};
+
+/// Physical values a quantity may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Domain {
+    /// Any finite number.
+    Any,
+    /// Zero or more.
+    NonNegative,
+    /// Above zero.
+    Positive,
+}
+
+impl Domain {
+    /// Whether a finite value is allowed.
+    pub fn contains(self, value: f64) -> bool {
+        match self {
+            Self::Any => value.is_finite(),
+            Self::NonNegative => value.is_finite() && value >= 0.0,
+            Self::Positive => value.is_finite() && value > 0.0,
+        }
+    }
+
+    /// The allowed values in words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Any => "any finite number",
+            Self::NonNegative => "zero or more",
+            Self::Positive => "a number above zero",
+        }
+    }
+}
+
+/// What a quantity belongs to: once a vehicle, or once per …
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// The vehicle.
+    Vehicle,
+    /// Modal label.
+    Mode,
+    /// Engine.
+    Engine,
+    /// Actuator of an engine.
+    Actuator,
+    /// Engine and modal label: the gimbal's part in a mode.
+    Gimbal,
+}
+
+/// One instance of a scope. Indices: engines as in [`Vehicle::engines`], actuators as in
+/// `Engine::actuators`, labels as in [`Modal::labels`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// The vehicle.
+    Vehicle,
+    /// A modal label.
+    Mode(usize),
+    /// An engine.
+    Engine(usize),
+    /// Engine and actuator.
+    Actuator(usize, usize),
+    /// Engine and modal label.
+    Gimbal(usize, usize),
+}
+
+/// What the registry says about a quantity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Definition {
+    /// Path template; segments in angle brackets vary.
+    pub path: &'static str,
+    /// Unit, SI symbols; `1` for a pure number.
+    pub unit: &'static str,
+    /// Values allowed.
+    pub domain: Domain,
+    /// What it belongs to.
+    pub scope: Scope,
+    /// Meaning, for reports, columns and documentation.
+    pub description: &'static str,
+}
+
+macro_rules! registry {
+    ($($name:ident, $scope:ident, $path:literal, $unit:literal, $domain:ident, $text:literal;)*) => {
+        /// A quantity that can be dispersed.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum Quantity { $(#[doc = $text] $name,)* }
+
+        impl Quantity {
+            /// Every quantity, in registry order.
+            pub const ALL: &'static [Self] = &[$(Self::$name,)*];
+
+            /// Its registry line.
+            pub fn definition(self) -> Definition {
+                match self {
+                    $(Self::$name => Definition {
+                        path: $path,
+                        unit: $unit,
+                        domain: Domain::$domain,
+                        scope: Scope::$scope,
+                        description: $text,
+                    },)*
+                }
+            }
+        }
+    };
+}
+
+registry! {
+    StructuralDamping, Vehicle, "structure.damping", "1", NonNegative, "structural damping ratio of every mode that has no own one";
+    ModeDamping, Mode, "modes.<label>.damping", "1", NonNegative, "structural damping ratio of a mode; nominal is the drawn structure.damping";
+    ModeFrequency, Mode, "modes.<label>.frequency", "Hz", Positive, "natural frequency of a mode, table in flight time";
+    Thrust, Engine, "<group>.<engine>.thrust", "N", NonNegative, "thrust R, table in flight time";
+    SpecificImpulse, Engine, "<group>.<engine>.specific_impulse", "s", Positive, "vacuum specific impulse Isp";
+    FlowProfile, Engine, "<group>.<engine>.flow_profile", "1", NonNegative, "ratio of the mass flow to R/(Isp g), table in flight time";
+    MassFlow, Engine, "<group>.<engine>.mass_flow", "kg/s", NonNegative, "mass flow, table in flight time; nominal is the drawn R/(Isp g) times flow_profile";
+    NozzleMass, Engine, "<group>.<engine>.nozzle.mass", "kg", Positive, "moving mass of the nozzle, unablated";
+    NozzleCg, Engine, "<group>.<engine>.nozzle.cg", "m", Any, "distance of the nozzle's cg from the pivot, positive aft, unablated";
+    NozzleInertia, Engine, "<group>.<engine>.nozzle.inertia", "kg m2", Positive, "transverse inertia of the nozzle about the pivot, unablated";
+    NozzleAxialInertia, Engine, "<group>.<engine>.nozzle.axial_inertia", "kg m2", Positive, "inertia of the nozzle about its own axis";
+    NozzleLength, Engine, "<group>.<engine>.nozzle.length", "m", NonNegative, "length from the pivot to the exit plane";
+    NozzleAblation, Engine, "<group>.<engine>.nozzle.ablation", "1", NonNegative, "liner ablation factor a: the share of the loss given for full burn";
+    BearingStiffness, Engine, "<group>.<engine>.bearing.stiffness", "N m/rad", NonNegative, "flex bearing stiffness of an actuator that does not include it";
+    BearingDamping, Engine, "<group>.<engine>.bearing.damping", "N m s/rad", NonNegative, "flex bearing damping";
+    ActuatorStiffness, Actuator, "<group>.<engine>.actuator.<actuator>.stiffness", "N m/rad", Positive, "actuator stiffness K_a";
+    ActuatorDamping, Actuator, "<group>.<engine>.actuator.<actuator>.damping", "1", NonNegative, "actuator damping ratio at the reference inertia";
+    GimbalShape, Gimbal, "<group>.<engine>.gimbal.<label>.shape", "1", Any, "gain on the gimbal translation of a mode, nominal 1";
+    GimbalSlope, Gimbal, "<group>.<engine>.gimbal.<label>.slope", "1", Any, "gain on the gimbal rotation of a mode, nominal 1";
+}
+
+impl Quantity {
+    /// Whether this instance exists: a nozzle without a liner has nothing to ablate.
+    fn exists(self, vehicle: &Vehicle, place: Place) -> bool {
+        match (self, place) {
+            (Self::NozzleAblation, Place::Engine(e)) => {
+                vehicle.engines[e].nozzle.ablation.is_some()
+            }
+            _ => true,
+        }
+    }
+}
+
+/// What a drawn vehicle does to a nominal value, which may be a table in time:
+/// `drawn(t) = scale · nominal(t) + offset`. An absolute value has scale 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Affine {
+    /// Factor on the nominal value, −.
+    pub scale: f64,
+    /// Added to it, in the unit of the parameter.
+    pub offset: f64,
+}
+
+impl Affine {
+    /// Leaves the nominal value as it is, bit for bit.
+    pub const IDENTITY: Self = Self { scale: 1.0, offset: 0.0 };
+
+    /// The drawn value for the nominal one.
+    pub fn apply(self, nominal: f64) -> f64 {
+        // 0 · nominal could be NaN for an infinite table entry; the vehicle has none.
+        self.scale * nominal + self.offset
+    }
+}
+
+/// One instance of a quantity in a vehicle.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Parameter {
+    /// Quantity.
+    pub quantity: Quantity,
+    /// What it belongs to.
+    pub place: Place,
+    /// Instance path, for instance `booster.left.nozzle.mass`.
+    pub path: String,
+    /// Whether the vehicle has it (see [`Quantity`]); if not, no row can address it.
+    pub exists: bool,
+}
+
+/// A modal label as dispersions see it.
+#[derive(Debug, Clone, PartialEq)]
+struct Label {
+    name: String,
+    /// Label under which it draws.
+    draws_as: String,
+    /// Nominal frequency that decides its band, Hz.
+    band_frequency_hz: f64,
+}
+
+/// All parameters of a vehicle, numbered; the case loop finds one by arithmetic.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameters {
+    engines: usize,
+    labels: Vec<Label>,
+    /// Number of the first parameter of each quantity.
+    first: Vec<usize>,
+    all: Vec<Parameter>,
+}
+
+/// Actuators an engine has: one per gimbal axis.
+const ACTUATORS: usize = 2;
+
+impl Parameters {
+    /// The parameters of `vehicle`, ordered by quantity, then engine, then actuator or label.
+    pub fn of(vehicle: &Vehicle) -> Self {
+        let labels: Vec<Label> = vehicle
+            .modal
+            .labels()
+            .into_iter()
+            .map(|name| {
+                let draws_as = vehicle.modal.draw_label(name);
+                Label {
+                    name: name.into(),
+                    draws_as: draws_as.into(),
+                    band_frequency_hz: band_frequency_hz(
+                        &vehicle.modal,
+                        draws_as,
+                        vehicle.band_time_s,
+                    ),
+                }
+            })
+            .collect();
+        let mut parameters =
+            Self { engines: vehicle.engines.len(), labels, first: Vec::new(), all: Vec::new() };
+        for &quantity in Quantity::ALL {
+            parameters.first.push(parameters.all.len());
+            for place in parameters.places(quantity.definition().scope) {
+                let path = parameters.path(vehicle, quantity, place);
+                let exists = quantity.exists(vehicle, place);
+                parameters.all.push(Parameter { quantity, place, path, exists });
+            }
+        }
+        parameters
+    }
+
+    fn places(&self, scope: Scope) -> Vec<Place> {
+        let engines = 0..self.engines;
+        match scope {
+            Scope::Vehicle => vec![Place::Vehicle],
+            Scope::Mode => (0..self.labels.len()).map(Place::Mode).collect(),
+            Scope::Engine => engines.map(Place::Engine).collect(),
+            Scope::Actuator => {
+                engines.flat_map(|e| (0..ACTUATORS).map(move |a| Place::Actuator(e, a))).collect()
+            }
+            Scope::Gimbal => engines
+                .flat_map(|e| (0..self.labels.len()).map(move |l| Place::Gimbal(e, l)))
+                .collect(),
+        }
+    }
+
+    fn path(&self, vehicle: &Vehicle, quantity: Quantity, place: Place) -> String {
+        let path = quantity.definition().path;
+        let engine = |path: &str, e: usize| {
+            let engine = &vehicle.engines[e];
+            path.replace("<group>", &engine.group).replace("<engine>", &engine.name)
+        };
+        match place {
+            Place::Vehicle => path.into(),
+            Place::Mode(l) => path.replace("<label>", &self.labels[l].name),
+            Place::Engine(e) => engine(path, e),
+            Place::Actuator(e, a) => {
+                let name = &vehicle.engines[e].actuators[a].name;
+                engine(path, e).replace("<actuator>", name)
+            }
+            Place::Gimbal(e, l) => engine(path, e).replace("<label>", &self.labels[l].name),
+        }
+    }
+
+    /// Number of a parameter. `place` must be of the quantity's scope and inside the vehicle.
+    pub fn index(&self, quantity: Quantity, place: Place) -> usize {
+        let (scope, offset) = match place {
+            Place::Vehicle => (Scope::Vehicle, 0),
+            Place::Mode(l) => (Scope::Mode, l),
+            Place::Engine(e) => (Scope::Engine, e),
+            Place::Actuator(e, a) => (Scope::Actuator, e * ACTUATORS + a),
+            Place::Gimbal(e, l) => (Scope::Gimbal, e * self.labels.len() + l),
+        };
+        debug_assert_eq!(scope, quantity.definition().scope, "{quantity:?} at {place:?}");
+        self.first[quantity as usize] + offset
+    }
+
+    /// The parameters by number.
+    pub fn all(&self) -> &[Parameter] {
+        &self.all
+    }
+
+    /// Number of parameters; the length of a case's effects.
+    pub fn count(&self) -> usize {
+        self.all.len()
+    }
+
+    /// Index of a modal label, as [`Place`] counts them.
+    pub fn label(&self, name: &str) -> Option<usize> {
+        self.labels.iter().position(|l| l.name == name)
+    }
+
+    /// The label under which label number `label` draws.
+    pub fn draw_label(&self, label: usize) -> &str {
+        &self.labels[label].draws_as
+    }
+
+    /// The nominal frequency that decides the band of label number `label`, Hz: at the band time,
+    /// or at the nearest flight time (the earlier of two) where a label that shares its draws
+    /// exists. Labels that share draws so share their band; where several exist at that time,
+    /// the label they draw under counts, else the lowest frequency.
+    pub fn band_frequency_hz(&self, label: usize) -> f64 {
+        self.labels[label].band_frequency_hz
+    }
+}
+
+impl Place {
+    /// Index of the modal label, where the place has one.
+    pub fn label(self) -> Option<usize> {
+        match self {
+            Self::Mode(l) | Self::Gimbal(_, l) => Some(l),
+            Self::Vehicle | Self::Engine(_) | Self::Actuator(..) => None,
+        }
+    }
+}
+
+/// See [`Parameters::band_frequency_hz`]; NaN, which lies in no band, if no label draws so.
+fn band_frequency_hz(modal: &Modal, draws_as: &str, band_time_s: f64) -> f64 {
+    let distance = |time_s: f64| (time_s - band_time_s).abs();
+    let mut nearest: Option<(f64, f64)> = None;
+    for set in &modal.sets {
+        let own = set.modes.iter().find(|m| m.label == draws_as);
+        let heir = || set.modes.iter().find(|m| modal.draw_label(&m.label) == draws_as);
+        let Some(mode) = own.or_else(heir) else { continue };
+        if nearest.is_none_or(|(time_s, _)| distance(set.flight_time_s) < distance(time_s)) {
+            nearest = Some((set.flight_time_s, mode.frequency_hz));
+        }
+    }
+    nearest.map_or(f64::NAN, |(_, frequency_hz)| frequency_hz)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixture::{vehicle, vehicle_with_descendants};
+    use super::*;
+
+    #[test]
+    fn every_parameter_is_found_under_its_own_number() {
+        let parameters = Parameters::of(&vehicle());
+        for (number, parameter) in parameters.all().iter().enumerate() {
+            assert_eq!(parameters.index(parameter.quantity, parameter.place), number);
+        }
+    }
+
+    #[test]
+    fn every_path_is_unique() {
+        let parameters = Parameters::of(&vehicle());
+        let mut paths: Vec<&str> = parameters.all().iter().map(|p| p.path.as_str()).collect();
+        paths.sort_unstable();
+        paths.dedup();
+        assert_eq!(paths.len(), parameters.count());
+    }
+
+    #[test]
+    fn a_template_has_exactly_the_segments_of_its_scope() {
+        for quantity in Quantity::ALL {
+            let definition = quantity.definition();
+            let variable: Vec<&str> =
+                definition.path.split('.').filter(|s| s.starts_with('<')).collect();
+            let expected: &[&str] = match definition.scope {
+                Scope::Vehicle => &[],
+                Scope::Mode => &["<label>"],
+                Scope::Engine => &["<group>", "<engine>"],
+                Scope::Actuator => &["<group>", "<engine>", "<actuator>"],
+                Scope::Gimbal => &["<group>", "<engine>", "<label>"],
+            };
+            assert_eq!(variable, expected, "{}", definition.path);
+            assert!(!definition.description.is_empty() && !definition.unit.is_empty());
+        }
+    }
+
+    #[test]
+    fn instances_carry_the_names_of_the_vehicle() {
+        let vehicle = vehicle();
+        let parameters = Parameters::of(&vehicle);
+        let label = parameters.label("m002").unwrap();
+        let path = |q, p| parameters.all()[parameters.index(q, p)].path.as_str();
+        assert_eq!(path(Quantity::StructuralDamping, Place::Vehicle), "structure.damping");
+        assert_eq!(path(Quantity::ModeFrequency, Place::Mode(label)), "modes.m002.frequency");
+        assert_eq!(path(Quantity::NozzleMass, Place::Engine(1)), "booster.right.nozzle.mass");
+        assert_eq!(
+            path(Quantity::ActuatorDamping, Place::Actuator(0, 1)),
+            "booster.left.actuator.tilt.damping"
+        );
+        assert_eq!(
+            path(Quantity::GimbalSlope, Place::Gimbal(1, label)),
+            "booster.right.gimbal.m002.slope"
+        );
+    }
+
+    #[test]
+    fn the_identity_leaves_a_nominal_value_bit_for_bit() {
+        for nominal in [0.1_f64, -3.7e9, 1e-300, 0.0] {
+            assert_eq!(Affine::IDENTITY.apply(nominal), nominal);
+        }
+    }
+
+    #[test]
+    fn a_band_is_fixed_at_the_band_time_or_the_nearest_time_where_the_mode_exists() {
+        let parameters = Parameters::of(&vehicle_with_descendants());
+        let band = |name: &str| parameters.band_frequency_hz(parameters.label(name).unwrap());
+        // m001 exists at the band time, 100 s.
+        assert_eq!(band("m001"), 4.0);
+        // m002 ends at 90 s; its heir m004 carries the mode at 100 s, for both.
+        assert_eq!((band("m002"), band("m004")), (5.2, 5.2));
+        // m003 ends at 90 s; m005 overlaps it by no more than a half and is a mode of its own.
+        assert_eq!((band("m003"), band("m005")), (9.9, 10.0));
+    }
+}
