@@ -4,3 +4,5 @@ pub mod files;
 pub mod flat;
 pub mod folder;
 pub mod package;
+pub mod scaffold;
+pub mod scenario;

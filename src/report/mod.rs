@@ -1,1 +1,4 @@
 //! Reports: from values to text for people.
+
+pub mod actuator;
+pub mod scenario;
