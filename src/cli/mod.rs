@@ -8,6 +8,7 @@ pub mod check;
 pub mod completions;
 pub mod error;
 pub mod init;
+pub mod modes;
 pub mod planar;
 pub mod schema;
 
@@ -40,6 +41,7 @@ struct Arguments {
 enum Command {
     Init(init::Args),
     Check(check::Args),
+    Modes(modes::Args),
     Planar(planar::Args),
     Actuator(actuator::Args),
     Schema(schema::Args),
@@ -53,6 +55,7 @@ pub fn run() -> ExitCode {
     let result: Result<u8, Error> = match &arguments.command {
         Command::Init(args) => init::run(args, &mut out),
         Command::Check(args) => check::run(args, &mut out),
+        Command::Modes(args) => modes::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),
         Command::Actuator(args) => actuator::run(args, &mut out),
         Command::Schema(args) => schema::run(args, &mut out),
