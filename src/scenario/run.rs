@@ -18,6 +18,8 @@ pub struct Corner {
     pub population: usize,
     /// Name, for messages.
     pub name: String,
+    /// Indices of the draws that stand at one of their `worst` values, ascending.
+    pub draws: Vec<usize>,
     /// Index of the mode whose damping is made least.
     pub mode: usize,
     /// Index of the variant in which it is made least.
@@ -77,7 +79,7 @@ pub fn resolve(
         let fixed = match corner.signs {
             SignsFile::Given => given(corner, &key, dispersion, f),
             SignsFile::Evaluated => {
-                corners.extend(evaluated(file, corner, &key, populations.len(), f));
+                corners.extend(evaluated(file, corner, &key, populations.len(), dispersion, f));
                 Vec::new()
             }
         };
@@ -194,38 +196,50 @@ fn given(
             f.push(format!("{key}.{name}"), format!("\"{value}\""), allowed);
         }
     }
+    if let Some(keys) = &corner.keys {
+        let found = format!("{} entries", keys.len());
+        f.push(format!("{key}.keys"), found, "nothing, or signs = \"evaluated\"");
+    }
     if corner.low.is_empty() && corner.high.is_empty() {
         f.push(key, "neither `low` nor `high`", "at least one entry in `low` or `high`");
     }
     let Some(dispersion) = dispersion else { return Vec::new() };
-    let mut sides: Vec<Option<usize>> = vec![None; dispersion.draws().len()];
-    for (side, (list, entries)) in [("low", &corner.low), ("high", &corner.high)].iter().enumerate()
-    {
-        for (i, entry) in entries.iter().enumerate() {
-            let place = format!("{key}.{list}[{i}]");
-            let mut matched = false;
-            for (draw, chosen) in dispersion.draws().iter().zip(&mut sides) {
-                let path = draw.key.split(" @ ").next().unwrap_or(&draw.key);
-                if draw.worst.is_none() || !(draw.key == *entry || pattern::matches(entry, path)) {
-                    continue;
-                }
-                matched = true;
-                if chosen.is_some_and(|other| other != side) {
-                    let found = format!("\"{}\", which is in `low` as well", draw.key);
-                    f.push(&place, found, "each key on one side");
-                }
-                *chosen = Some(side);
-            }
-            if !matched {
-                let known = dispersion.draws().iter().filter(|d| d.worst.is_some());
-                let allowed = allowed_instead(entry, known.map(|d| d.key.as_str()));
-                let found = format!("\"{entry}\", which matches no draw key with `worst` values");
-                f.push(&place, found, allowed);
-            }
+    let low = matching(dispersion, &corner.low, &format!("{key}.low"), f);
+    let high = matching(dispersion, &corner.high, &format!("{key}.high"), f);
+    let both: Vec<usize> = low.iter().copied().filter(|i| high.contains(i)).collect();
+    if let Some(&first) = both.first() {
+        let key_of = &dispersion.draws()[first].key;
+        let found = format!("{} keys that are in `low` as well, first \"{key_of}\"", both.len());
+        f.push(format!("{key}.high"), found, "each key on one side");
+    }
+    let side = |side: usize| move |i: usize| Some((i, dispersion.draws()[i].worst?[side]));
+    let mut fixed: Vec<(usize, f64)> = low.into_iter().filter_map(side(0)).collect();
+    fixed.extend(high.into_iter().filter_map(side(1)));
+    fixed.sort_by_key(|(index, _)| *index);
+    fixed
+}
+
+/// Indices of the draws with `worst` values that `entries` name, ascending; an entry is a whole
+/// key or a pattern of its parameter path.
+fn matching(
+    dispersion: &Dispersion,
+    entries: &[String],
+    place: &str,
+    f: &mut Findings,
+) -> Vec<usize> {
+    let names = |entry: &str, key: &str| {
+        key == entry || pattern::matches(entry, key.split(" @ ").next().unwrap_or(key))
+    };
+    let adverse = || dispersion.draws().iter().enumerate().filter(|(_, d)| d.worst.is_some());
+    for (i, entry) in entries.iter().enumerate() {
+        if !adverse().any(|(_, draw)| names(entry, &draw.key)) {
+            let allowed = allowed_instead(entry, adverse().map(|(_, d)| d.key.as_str()));
+            let found = format!("\"{entry}\", which matches no draw key with `worst` values");
+            f.push(format!("{place}[{i}]"), found, allowed);
         }
     }
-    let values = dispersion.draws().iter().zip(sides).enumerate();
-    values.filter_map(|(i, (draw, side))| Some((i, draw.worst?[side?]))).collect()
+    let chosen = adverse().filter(|(_, draw)| entries.iter().any(|e| names(e, &draw.key)));
+    chosen.map(|(i, _)| i).collect()
 }
 
 /// A corner whose signs are evaluated.
@@ -234,6 +248,7 @@ fn evaluated(
     corner: &CornerFile,
     key: &str,
     population: usize,
+    dispersion: Option<&Dispersion>,
     f: &mut Findings,
 ) -> Option<Corner> {
     for (list, entries) in [("low", &corner.low), ("high", &corner.high)] {
@@ -255,5 +270,19 @@ fn evaluated(
     let mode = index("mode", &corner.mode, modes);
     let variants = file.variant.iter().map(|v| v.name.as_str()).collect();
     let variant = index("variant", &corner.variant, variants);
-    Some(Corner { population, name: corner.name.clone(), mode: mode?, variant: variant? })
+    let dispersion = dispersion?;
+    let draws = match &corner.keys {
+        Some(entries) => matching(dispersion, entries, &format!("{key}.keys"), f),
+        None => {
+            let all = dispersion.draws().iter().enumerate();
+            all.filter(|(_, d)| d.worst.is_some()).map(|(i, _)| i).collect()
+        }
+    };
+    if draws.is_empty() {
+        f.push(key, "no draw key with `worst` values", "at least one");
+    }
+    Some(Corner { population, name: corner.name.clone(), draws, mode: mode?, variant: variant? })
 }
+
+#[cfg(test)]
+mod tests;
