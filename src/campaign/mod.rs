@@ -1,8 +1,17 @@
 //! A campaign: cases evaluated in a parallel pool, their records and what they sum up to.
 
 pub mod definition;
+pub mod metric;
+pub mod outline;
 pub mod plant;
+pub mod pool;
 pub mod record;
+pub mod row;
+pub mod summary;
+#[cfg(test)]
+pub mod synthetic;
 
 pub use definition::{Definition, NozzleJet, Population, Slope, Variant};
+pub use outline::{DrawColumn, Input, Outline, StoredPoles};
+pub use pool::{Pool, Progress, Span};
 pub use record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};

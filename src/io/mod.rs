@@ -1,6 +1,18 @@
 //! Input and output: the only module that touches the disk.
 
-pub mod files;
 pub mod flat;
 pub mod folder;
 pub mod package;
+pub mod column;
+pub mod files;
+pub mod manifest;
+pub mod results;
+pub mod run;
+pub mod schema;
+pub mod summarise;
+#[cfg(test)]
+mod synthetic;
+pub mod table;
+
+pub use results::{Finished, Results};
+pub use run::Run;
