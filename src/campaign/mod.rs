@@ -1,6 +1,8 @@
 //! A campaign: cases evaluated in a parallel pool, their records and what they sum up to.
 
 pub mod definition;
+pub mod draw;
+pub mod evaluator;
 pub mod metric;
 pub mod outline;
 pub mod plant;
@@ -12,6 +14,7 @@ pub mod summary;
 pub mod synthetic;
 
 pub use definition::{Definition, NozzleJet, Population, Slope, Variant};
+pub use evaluator::Evaluator;
 pub use outline::{DrawColumn, Input, Outline, StoredPoles};
 pub use pool::{Pool, Progress, Span};
 pub use record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};
