@@ -64,3 +64,23 @@ pub struct Definition {
     /// Second-best to best overlap above which a case is followed by homotopy and both poles are stored.
     pub exchange_ratio: f64,
 }
+
+impl Definition {
+    /// Sets the number of cases of the dispersed population and of every corner's Monte Carlo.
+    pub fn set_cases(&mut self, cases: u64) {
+        for population in self.populations.iter_mut().filter(|p| p.drawn) {
+            population.cases = cases;
+        }
+    }
+
+    /// Fixes the draws of the corner at index `population` and of the Monte Carlo around it, which
+    /// follows if there is one.
+    pub fn fix_corner(&mut self, population: usize, fixed: &[(usize, f64)]) {
+        let around = format!("{}_dispersed", self.populations[population].name);
+        for (index, member) in self.populations.iter_mut().enumerate() {
+            if index == population || member.name == around {
+                member.fixed = fixed.to_vec();
+            }
+        }
+    }
+}

@@ -213,7 +213,7 @@ impl<'a> Evaluator<'a> {
         let prepared = &at.variants[variant];
         let plant = at.plant(variant);
         plant.assemble(vehicle, &prepared.effects, model);
-        solver.poles(model, poles).map_err(|error| failure_of(&error))?;
+        solver.poles(model, poles).map_err(|error| Failure::from(&error))?;
         let mut scratch = Model::zeros(model.coordinates());
         let mut rows = Vec::new();
         for (mode, reference) in prepared.references.iter().enumerate() {
@@ -251,7 +251,7 @@ impl<'a> Evaluator<'a> {
 
     fn lost(&self, mode: usize, lost: identify::Lost) -> Failure {
         match lost {
-            identify::Lost::Solve(error) => failure_of(&error),
+            identify::Lost::Solve(error) => Failure::from(&error),
             identify::Lost::Overlap { .. } => Failure::new(
                 FailureKind::IdentityLost,
                 format!("mode {}: {lost}", self.definition.modes[mode]),
@@ -286,14 +286,16 @@ fn named_pole(
     })
 }
 
-fn failure_of(error: &eigen::Error) -> Failure {
-    let kind = match error {
-        eigen::Error::NonFinite(_) => FailureKind::NonFinite,
-        eigen::Error::SingularMass { .. } => FailureKind::SingularMass,
-        eigen::Error::NoConvergence => FailureKind::NoConvergence,
-        eigen::Error::Trace { .. } => FailureKind::Residual,
-    };
-    Failure::new(kind, error.to_string())
+impl From<&eigen::Error> for Failure {
+    fn from(error: &eigen::Error) -> Self {
+        let kind = match error {
+            eigen::Error::NonFinite(_) => FailureKind::NonFinite,
+            eigen::Error::SingularMass { .. } => FailureKind::SingularMass,
+            eigen::Error::NoConvergence => FailureKind::NoConvergence,
+            eigen::Error::Trace { .. } => FailureKind::Residual,
+        };
+        Self::new(kind, error.to_string())
+    }
 }
 
 /// Prepares one flight time.

@@ -3,6 +3,7 @@
 //! No clock, host or thread count: two runs of one outline give the same bytes.
 
 use super::definition::Definition;
+use crate::dispersion::Draw;
 use serde::{Deserialize, Serialize};
 
 /// Which poles the `modes` table holds.
@@ -31,6 +32,17 @@ pub struct DrawColumn {
 }
 
 impl DrawColumn {
+    /// The description of a draw of a dispersion.
+    pub fn of(draw: &Draw) -> Self {
+        Self {
+            key: draw.key.clone(),
+            column: draw.column.clone(),
+            unit: draw.unit.to_owned(),
+            description: draw.description.to_owned(),
+            range: draw.law.range(),
+        }
+    }
+
     /// Column of the normal score in the `cases` table: `z_…`.
     pub fn score_column(&self) -> String {
         format!("z_{}", self.column.strip_prefix("draw_").unwrap_or(&self.column))

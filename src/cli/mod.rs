@@ -3,7 +3,18 @@
 //! One file a command: each has its clap `Args` and a `run` that writes to the given output and
 //! returns the exit code. Nothing here computes.
 
+pub mod actuator;
+pub mod check;
+pub mod completions;
 pub mod error;
+pub mod init;
+pub mod nominal;
+pub mod plan;
+pub mod planar;
+pub mod progress;
+pub mod replay;
+pub mod run;
+pub mod schema;
 pub mod summary;
 
 pub use error::Error;
@@ -26,23 +37,42 @@ pub const INCONCLUSIVE: u8 = 4;
 /// Monte Carlo dispersion engine for thrust vector servoelastic coupling.
 #[derive(Parser)]
 #[command(name = "tvse", version, about, propagate_version = true)]
-struct Arguments {
+pub struct Arguments {
     #[command(subcommand)]
     command: Command,
 }
 
 #[derive(Subcommand)]
 enum Command {
-    /// Statistics of a finished run, computed again from its tables.
+    Init(init::Args),
+    Check(check::Args),
+    Plan(plan::Args),
+    Nominal(nominal::Args),
+    Run(run::Args),
     Summary(summary::Args),
+    Replay(replay::Args),
+    Planar(planar::Args),
+    Actuator(actuator::Args),
+    Schema(schema::Args),
+    Completions(completions::Args),
 }
 
 /// Parses the arguments of the process, runs the command and returns the exit code.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let mut out = std::io::stdout().lock();
-    let result: Result<u8, Error> = match arguments.command {
-        Command::Summary(args) => summary::run(&args, &mut out),
+    let result: Result<u8, Error> = match &arguments.command {
+        Command::Init(args) => init::run(args, &mut out),
+        Command::Check(args) => check::run(args, &mut out),
+        Command::Plan(args) => plan::run(args, &mut out),
+        Command::Nominal(args) => nominal::run(args, &mut out),
+        Command::Run(args) => run::run(args, &mut out),
+        Command::Summary(args) => summary::run(args, &mut out),
+        Command::Replay(args) => replay::run(args, &mut out),
+        Command::Planar(args) => planar::run(args, &mut out),
+        Command::Actuator(args) => actuator::run(args, &mut out),
+        Command::Schema(args) => schema::run(args, &mut out),
+        Command::Completions(args) => completions::run(args, &mut out),
     };
     let code = result.unwrap_or_else(|error: Error| {
         eprintln!("{error}");

@@ -146,9 +146,14 @@ fn print(planar: &Planar, out: &mut dyn Write) -> Result<(), Error> {
     writeln!(out, "limit Υ ω_b²/φ as ζ_b → 0      {}", or(planar.undamped_bound_n(), "N", never))?;
     let dog = or(planar.tail_wags_dog_rad_s(), "rad/s", "none: Rφ/Υ is not positive");
     writeln!(out, "tail-wags-dog frequency        {dog}")?;
-    let added = or(planar.first_order_added_damping(), "", "none: an undamped actuator in resonance");
+    let added =
+        or(planar.first_order_added_damping(), "", "none: an undamped actuator in resonance");
     writeln!(out, "damping ratio added, 1st order {}", added.trim_end())?;
-    writeln!(out, "\n{:>20}{:>20}{:>20}{:>20}", "Re s, rad/s", "Im s, rad/s", "|Im s|/2π, Hz", "damping ratio")?;
+    writeln!(
+        out,
+        "\n{:>20}{:>20}{:>20}{:>20}",
+        "Re s, rad/s", "Im s, rad/s", "|Im s|/2π, Hz", "damping ratio"
+    )?;
     for pole in poles(planar)? {
         let hertz = pole.im.abs() / std::f64::consts::TAU;
         let cells = [pole.re, pole.im, hertz, -pole.re / pole.norm()].map(number);
@@ -158,7 +163,11 @@ fn print(planar: &Planar, out: &mut dyn Write) -> Result<(), Error> {
 }
 
 fn sweep(planar: &Planar, range: &str, out: &mut dyn Write) -> Result<(), Error> {
-    let usage = || Error::Usage(format!("--sweep: found \"{range}\"; allowed: FROM:TO:COUNT, for instance 0:1:101"));
+    let usage = || {
+        Error::Usage(format!(
+            "--sweep: found \"{range}\"; allowed: FROM:TO:COUNT, for instance 0:1:101"
+        ))
+    };
     let parts: Vec<&str> = range.split(':').collect();
     let [from, to, count] = parts.as_slice() else { return Err(usage()) };
     let from: f64 = from.trim().parse().map_err(|_| usage())?;
@@ -200,12 +209,27 @@ mod tests {
     }
 
     const PAIR: [&str; 16] = [
-        "planar", "--inertia", "1", "--zeta-n", "0.3", "--omega-n", "1.2", "--zeta-b", "0.005",
-        "--omega-b", "1", "--phi", "1", "--upsilon", "0.2", "--thrust=0.2",
+        "planar",
+        "--inertia",
+        "1",
+        "--zeta-n",
+        "0.3",
+        "--omega-n",
+        "1.2",
+        "--zeta-b",
+        "0.005",
+        "--omega-b",
+        "1",
+        "--phi",
+        "1",
+        "--upsilon",
+        "0.2",
+        "--thrust=0.2",
     ];
 
     fn output(arguments: &[&str]) -> Result<String, Error> {
-        let command = Command::try_parse_from(arguments).map_err(|e| Error::Usage(e.to_string()))?;
+        let command =
+            Command::try_parse_from(arguments).map_err(|e| Error::Usage(e.to_string()))?;
         let mut out = Vec::new();
         run(&command.args, &mut out)?;
         Ok(String::from_utf8(out).unwrap())
@@ -214,7 +238,13 @@ mod tests {
     #[test]
     fn the_reference_pair_is_printed_with_the_stated_digits() {
         let text = output(&PAIR).unwrap();
-        for expected in ["0.2502057481 N", "12.2360000000 N", "-4.866974", "0.9997954647", "verdict                        stable"] {
+        for expected in [
+            "0.2502057481 N",
+            "12.2360000000 N",
+            "-4.866974",
+            "0.9997954647",
+            "verdict                        stable",
+        ] {
             assert!(text.contains(expected), "{expected} in\n{text}");
         }
     }

@@ -1,13 +1,18 @@
 //! Input and output: the only module that touches the disk.
 
-pub mod flat;
-pub mod folder;
-pub mod package;
 pub mod column;
 pub mod files;
+pub mod flat;
+pub mod folder;
+pub mod inputs;
 pub mod manifest;
+pub mod package;
+pub mod plan;
+pub mod replay;
 pub mod results;
 pub mod run;
+pub mod scaffold;
+pub mod scenario;
 pub mod schema;
 pub mod summarise;
 #[cfg(test)]

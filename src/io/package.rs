@@ -185,6 +185,12 @@ fn table_path(layout: &Layout) -> PathBuf {
     Path::new("tables").join(format!("{}.parquet", layout.name))
 }
 
+/// The files of the package in `dir`.
+pub fn files(dir: &Path) -> Vec<PathBuf> {
+    let tables = LAYOUTS.iter().map(|layout| dir.join(table_path(layout)));
+    std::iter::once(dir.join(HEADER)).chain(tables).collect()
+}
+
 /// The tables of `modal` in the order of [`LAYOUTS`].
 fn tables(modal: &Modal) -> [Table; 5] {
     let mut tables = LAYOUTS.map(Table::new);

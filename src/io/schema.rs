@@ -121,13 +121,24 @@ fn mode<R>(
     Column::word("mode", description, outline.definition.modes.clone(), get)
 }
 
-/// Columns of the `cases` table.
-pub fn cases(outline: &Outline) -> Vec<Column<CaseRow>> {
-    let mut columns = vec![
+/// Columns of a table of draws alone: which case, drawn values, normal scores.
+pub fn plan(outline: &Outline) -> Vec<Column<CaseRow>> {
+    identity(outline).into_iter().chain(draws(outline)).collect()
+}
+
+fn identity(outline: &Outline) -> Vec<Column<CaseRow>> {
+    vec![
         population(outline, |r: &CaseRow| r.population),
         Column::count("case", "Case index inside the population", |r: &CaseRow| {
             Some(r.case as i64)
         }),
+    ]
+}
+
+/// Columns of the `cases` table.
+pub fn cases(outline: &Outline) -> Vec<Column<CaseRow>> {
+    let mut columns = identity(outline);
+    columns.extend([
         Column::word(
             "status",
             "ok, or the kind of the first failure",
@@ -137,7 +148,7 @@ pub fn cases(outline: &Outline) -> Vec<Column<CaseRow>> {
         Column::text("failure_message", "What the first failure says", |r: &CaseRow| {
             r.failure.as_ref().map(|f| f.message.as_str())
         }),
-    ];
+    ]);
     for metric in metrics(&outline.definition) {
         let (name, unit, description) = (metric.name.clone(), metric.unit, &metric.description);
         let description = format!("{description}; NULL if an evaluation failed");
@@ -149,6 +160,12 @@ pub fn cases(outline: &Outline) -> Vec<Column<CaseRow>> {
             Column::number(name, unit, description, move |r: &CaseRow| metric.value(&r.reduced))
         });
     }
+    columns.extend(draws(outline));
+    columns
+}
+
+fn draws(outline: &Outline) -> Vec<Column<CaseRow>> {
+    let mut columns = Vec::new();
     for (index, draw) in outline.draws.iter().enumerate() {
         let description = format!("{}; key {}", draw.description, draw.key);
         let value = move |r: &CaseRow| r.values.get(index).copied();

@@ -38,7 +38,7 @@ pub fn modal() -> Modal {
         .map(|(name, at)| Grid {
             name,
             position_m: Vector3::from(at),
-            mass_kg: 0.0,
+            mass_kg: Vector3::zeros(),
             inertia_kg_m2: Vector3::zeros(),
         })
         .collect();
