@@ -8,6 +8,7 @@ pub mod check;
 pub mod completions;
 pub mod error;
 pub mod init;
+pub mod modes;
 pub mod nominal;
 pub mod plan;
 pub mod planar;
@@ -47,6 +48,7 @@ enum Command {
     Init(init::Args),
     Check(check::Args),
     Plan(plan::Args),
+    Modes(modes::Args),
     Nominal(nominal::Args),
     Run(run::Args),
     Summary(summary::Args),
@@ -65,6 +67,7 @@ pub fn run() -> ExitCode {
         Command::Init(args) => init::run(args, &mut out),
         Command::Check(args) => check::run(args, &mut out),
         Command::Plan(args) => plan::run(args, &mut out),
+        Command::Modes(args) => modes::run(args, &mut out),
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),

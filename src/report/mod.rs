@@ -5,3 +5,4 @@ pub mod nominal;
 pub mod plan;
 pub mod scenario;
 pub mod story;
+pub mod modes;

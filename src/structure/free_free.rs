@@ -90,6 +90,7 @@ pub fn free_free(model: &Weighed, limit: f64, count: usize) -> Result<FreeFree, 
     orientation::orient(&omega2, &mut shapes, model);
     omega2.truncate(kept);
     shapes.truncate(n, kept);
+    clear_round_off(&mut shapes, m);
     let rigid = Rigid {
         count: 6,
         strain: greatest_strain(k, rigid_shapes.as_ref()),
@@ -116,6 +117,20 @@ fn rigid_shapes(model: &Weighed) -> Result<Mat<f64>, Error> {
         .and_then(|cholesky| cholesky.l().transpose().try_inverse())
         .ok_or(Error::Massless)?;
     Ok(&shapes * Mat::from_fn(6, 6, |i, j| inverse[(i, j)]))
+}
+
+/// Sets to zero what is no more than round-off beside the unit generalised mass, so that motions
+/// which symmetry forbids are exactly zero.
+fn clear_round_off(shapes: &mut Mat<f64>, m: MatRef<'_, f64>) {
+    let n = m.nrows();
+    let floor = (n as f64 * f64::EPSILON).powi(2);
+    for j in 0..shapes.ncols() {
+        for i in 0..n {
+            if m[(i, i)] * shapes[(i, j)].powi(2) <= floor && m[(i, i)] > 0.0 {
+                shapes[(i, j)] = 0.0;
+            }
+        }
+    }
 }
 
 fn greatest_strain(k: MatRef<'_, f64>, shapes: MatRef<'_, f64>) -> f64 {
