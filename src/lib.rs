@@ -18,6 +18,7 @@ pub mod modal;
 pub mod problem;
 pub mod report;
 pub mod scenario;
+pub mod spelling;
 pub mod stats;
 pub mod structure;
 pub mod vehicle;

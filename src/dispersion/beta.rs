@@ -65,7 +65,8 @@ impl Beta {
             let slope = (alpha * t.ln() + (beta - 1.0) * (-t).ln_1p() - ln_beta).exp();
             let step = (p / value).ln() * value / slope;
             let next = t * step.exp();
-            let done = (next - t).abs() <= 2.0 * f64::EPSILON * t || high - low <= f64::EPSILON * low;
+            let done =
+                (next - t).abs() <= 2.0 * f64::EPSILON * t || high - low <= f64::EPSILON * low;
             t = next;
             if done {
                 break;

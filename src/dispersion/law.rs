@@ -69,17 +69,47 @@ pub struct Law(Shape);
 
 #[derive(Debug, Clone, PartialEq)]
 enum Shape {
-    Fixed { value: f64 },
-    Normal { mean: f64, sigma: f64 },
-    TruncatedNormal { mean: f64, sigma: f64, scores: [f64; 2], range: [f64; 2] },
-    Uniform { low: f64, high: f64 },
-    Triangular { low: f64, mode: f64, high: f64 },
-    Lognormal { median: f64, sigma_ln: f64 },
-    Beta { shape: beta::Beta, low: f64, high: f64 },
+    Fixed {
+        value: f64,
+    },
+    Normal {
+        mean: f64,
+        sigma: f64,
+    },
+    TruncatedNormal {
+        mean: f64,
+        sigma: f64,
+        scores: [f64; 2],
+        range: [f64; 2],
+    },
+    Uniform {
+        low: f64,
+        high: f64,
+    },
+    Triangular {
+        low: f64,
+        mode: f64,
+        high: f64,
+    },
+    Lognormal {
+        median: f64,
+        sigma_ln: f64,
+    },
+    Beta {
+        shape: beta::Beta,
+        low: f64,
+        high: f64,
+    },
     /// Ascending values and the probability up to and including each; the last is one.
-    Discrete { values: Vec<f64>, cumulative: Vec<f64> },
+    Discrete {
+        values: Vec<f64>,
+        cumulative: Vec<f64>,
+    },
     /// Ascending probabilities from zero to one and the non-decreasing values there.
-    Empirical { probabilities: Vec<f64>, values: Vec<f64> },
+    Empirical {
+        probabilities: Vec<f64>,
+        values: Vec<f64>,
+    },
 }
 
 fn require(
@@ -213,7 +243,12 @@ impl Law {
     pub fn discrete(values: &[f64], weights: &[f64]) -> Result<Self, Refusal> {
         require("values", !values.is_empty(), "an empty list", "at least one value")?;
         let same = "as many weights as values";
-        require("weights", weights.len() == values.len(), format!("{} weights", weights.len()), same)?;
+        require(
+            "weights",
+            weights.len() == values.len(),
+            format!("{} weights", weights.len()),
+            same,
+        )?;
         values.iter().try_for_each(|&v| finite("values", v))?;
         weights.iter().try_for_each(|&w| positive("weights", w))?;
         let mut pairs: Vec<(f64, f64)> =
@@ -328,8 +363,15 @@ impl Law {
                 let upper =
                     probabilities.partition_point(|&p| p < below).clamp(1, values.len() - 1);
                 let (p, v) = (&probabilities[upper - 1..=upper], &values[upper - 1..=upper]);
-                let share = (below - p[0]) / (p[1] - p[0]);
-                within((1.0 - share) * v[0] + share * v[1], v[0], v[1])
+                // Shares of the two ends, the one of the nearer tail first.
+                let (from, to) = if below <= above {
+                    let to = (below - p[0]) / (p[1] - p[0]);
+                    (1.0 - to, to)
+                } else {
+                    let from = (above - (1.0 - p[1])) / (p[1] - p[0]);
+                    (from, 1.0 - from)
+                };
+                within(from * v[0] + to * v[1], v[0], v[1])
             }
         }
     }
@@ -361,9 +403,7 @@ impl Law {
                 let total = normal::between(scores[0], scores[1]);
                 (normal::between(scores[0], z) / total, normal::between(z, scores[1]) / total)
             }
-            Shape::Uniform { low, high } => {
-                ((x - low) / (high - low), (high - x) / (high - low))
-            }
+            Shape::Uniform { low, high } => ((x - low) / (high - low), (high - x) / (high - low)),
             Shape::Triangular { low, mode, high } => {
                 let width = high - low;
                 if x <= *mode {
@@ -390,9 +430,9 @@ impl Law {
             Shape::Empirical { probabilities, values } => {
                 // The last entry at or below x, so that equal values count up to the last.
                 let i = values.partition_point(|&v| v <= x) - 1;
-                let share = (x - values[i]) / (values[i + 1] - values[i]);
-                let below = (1.0 - share) * probabilities[i] + share * probabilities[i + 1];
-                (below, 1.0 - below)
+                let (p, v) = (&probabilities[i..=i + 1], &values[i..=i + 1]);
+                let (from, to) = ((v[1] - x) / (v[1] - v[0]), (x - v[0]) / (v[1] - v[0]));
+                (from * p[0] + to * p[1], from * (1.0 - p[0]) + to * (1.0 - p[1]))
             }
         }
     }
@@ -461,10 +501,13 @@ impl Law {
         (low < high).then(|| (x - low) / (high - low))
     }
 
-    /// Whether the law cannot give `x`: outside its support, or none of its discrete values.
+    /// Whether the law cannot give `x`: outside its support by more than the rounding of a bound
+    /// that was computed from sigma, or none of its discrete values.
     pub fn is_outside(&self, x: f64) -> bool {
         let [low, high] = self.support();
-        let inside = low <= x && x <= high;
+        let size = [low, high].map(|end| if end.is_finite() { end.abs() } else { 0.0 });
+        let rounding = 4.0 * f64::EPSILON * size[0].max(size[1]);
+        let inside = low - rounding <= x && x <= high + rounding;
         match &self.0 {
             Shape::Discrete { values, .. } => !values.contains(&x),
             _ => !inside,

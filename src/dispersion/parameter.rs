@@ -134,7 +134,9 @@ impl Quantity {
     /// Whether this instance exists: a nozzle without a liner has nothing to ablate.
     fn exists(self, vehicle: &Vehicle, place: Place) -> bool {
         match (self, place) {
-            (Self::NozzleAblation, Place::Engine(e)) => vehicle.engines[e].nozzle.ablation.is_some(),
+            (Self::NozzleAblation, Place::Engine(e)) => {
+                vehicle.engines[e].nozzle.ablation.is_some()
+            }
             _ => true,
         }
     }
@@ -209,7 +211,11 @@ impl Parameters {
                 Label {
                     name: name.into(),
                     draws_as: draws_as.into(),
-                    band_frequency_hz: band_frequency_hz(&vehicle.modal, draws_as, vehicle.band_time_s),
+                    band_frequency_hz: band_frequency_hz(
+                        &vehicle.modal,
+                        draws_as,
+                        vehicle.band_time_s,
+                    ),
                 }
             })
             .collect();

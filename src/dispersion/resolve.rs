@@ -4,7 +4,7 @@
 
 use super::draw::{Dispersion, Draw, Role, Shared, name_columns};
 use super::law::Law;
-use super::parameter::{Domain, Parameter, Parameters, Quantity, Scope};
+use super::parameter::{Domain, Parameter, Parameters, Place, Quantity, Scope};
 use super::table::{Apply, Common, Row, Table};
 use crate::spelling;
 use crate::vehicle::{Bearing, Vehicle};
@@ -356,22 +356,21 @@ fn check_bearing(
     if quantity != Quantity::BearingStiffness {
         return;
     }
-    let included: BTreeSet<&str> = targets
+    let included: Vec<&str> = targets
         .iter()
         .map(|&target| &parameters.all()[target])
-        .filter(|parameter| {
-            vehicle.engines.iter().any(|engine| {
-                parameter.path.starts_with(&format!("{}.", engine.path()))
-                    && engine.actuators.iter().all(|a| a.bearing == Bearing::Included)
-            })
+        .filter(|parameter| match parameter.place {
+            Place::Engine(e) => {
+                vehicle.engines[e].actuators.iter().all(|a| a.bearing == Bearing::Included)
+            }
+            _ => false,
         })
         .map(|parameter| parameter.path.as_str())
         .collect();
     if !included.is_empty() {
-        let list = included.into_iter().collect::<Vec<_>>().join(", ");
         let allowed = "bearings of engines with an actuator whose bearing is \"separate\"; \
                        an included one is part of the actuator stiffness";
-        at("path", format!("the included bearing of {list}"), allowed.into());
+        at("path", format!("the included bearing of {}", included.join(", ")), allowed.into());
     }
 }
 

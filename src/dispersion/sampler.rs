@@ -36,6 +36,11 @@ impl<'a> Sampler<'a> {
         Self { dispersion, plan: Plan::monte_carlo(dispersion, seed) }
     }
 
+    /// The dispersion from which it draws.
+    pub fn dispersion(&self) -> &'a Dispersion {
+        self.dispersion
+    }
+
     /// A cursor with buffers of its own, one a thread.
     pub fn cursor(&self) -> Cursor<'_> {
         let count = self.dispersion.draws().len();
@@ -86,8 +91,9 @@ impl Cursor<'_> {
             values[index] = Some(value);
             scores[index] = all[index].law.score(value);
         }
-        let individual =
-            |index: usize| drawn.then(|| Position::of_uniform(self.uniforms[index * WINDOW + slot]));
+        let individual = |index: usize| {
+            drawn.then(|| Position::of_uniform(self.uniforms[index * WINDOW + slot]))
+        };
         // Common scores come first, since the others need them.
         for (index, draw) in all.iter().enumerate() {
             if values[index].is_none() && draw.role == Role::Common {
@@ -115,8 +121,11 @@ impl Cursor<'_> {
             };
             let value = draw.law.value(&position);
             values[index] = Some(value);
-            scores[index] =
-                if draw.law.is_continuous() { Some(position.score()) } else { draw.law.score(value) };
+            scores[index] = if draw.law.is_continuous() {
+                Some(position.score())
+            } else {
+                draw.law.score(value)
+            };
         }
         for combination in self.sampler.dispersion.combinations() {
             let mut effect = match combination.absolute.and_then(|index| values[index]) {
