@@ -363,8 +363,15 @@ impl Law {
                 let upper =
                     probabilities.partition_point(|&p| p < below).clamp(1, values.len() - 1);
                 let (p, v) = (&probabilities[upper - 1..=upper], &values[upper - 1..=upper]);
-                let share = (below - p[0]) / (p[1] - p[0]);
-                within((1.0 - share) * v[0] + share * v[1], v[0], v[1])
+                // Shares of the two ends, the one of the nearer tail first.
+                let (from, to) = if below <= above {
+                    let to = (below - p[0]) / (p[1] - p[0]);
+                    (1.0 - to, to)
+                } else {
+                    let from = (above - (1.0 - p[1])) / (p[1] - p[0]);
+                    (from, 1.0 - from)
+                };
+                within(from * v[0] + to * v[1], v[0], v[1])
             }
         }
     }
@@ -423,9 +430,9 @@ impl Law {
             Shape::Empirical { probabilities, values } => {
                 // The last entry at or below x, so that equal values count up to the last.
                 let i = values.partition_point(|&v| v <= x) - 1;
-                let share = (x - values[i]) / (values[i + 1] - values[i]);
-                let below = (1.0 - share) * probabilities[i] + share * probabilities[i + 1];
-                (below, 1.0 - below)
+                let (p, v) = (&probabilities[i..=i + 1], &values[i..=i + 1]);
+                let (from, to) = ((v[1] - x) / (v[1] - v[0]), (x - v[0]) / (v[1] - v[0]));
+                (from * p[0] + to * p[1], from * (1.0 - p[0]) + to * (1.0 - p[1]))
             }
         }
     }
@@ -498,9 +505,9 @@ impl Law {
     /// that was computed from sigma, or none of its discrete values.
     pub fn is_outside(&self, x: f64) -> bool {
         let [low, high] = self.support();
-        let rounding =
-            |end: f64| if end.is_finite() { 4.0 * f64::EPSILON * end.abs() } else { 0.0 };
-        let inside = low - rounding(low) <= x && x <= high + rounding(high);
+        let size = [low, high].map(|end| if end.is_finite() { end.abs() } else { 0.0 });
+        let rounding = 4.0 * f64::EPSILON * size[0].max(size[1]);
+        let inside = low - rounding <= x && x <= high + rounding;
         match &self.0 {
             Shape::Discrete { values, .. } => !values.contains(&x),
             _ => !inside,

@@ -36,8 +36,8 @@ impl<'a> Sampler<'a> {
         Self { dispersion, plan: Plan::monte_carlo(dispersion, seed) }
     }
 
-    /// The dispersion that is sampled.
-    pub fn dispersion(&self) -> &Dispersion {
+    /// The dispersion from which it draws.
+    pub fn dispersion(&self) -> &'a Dispersion {
         self.dispersion
     }
 
