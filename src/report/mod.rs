@@ -1,1 +1,8 @@
-//! Reports: from values to text for people.
+//! Values become text: terminal tables, Markdown, HTML and SVG.
+
+mod number;
+
+pub mod gates;
+pub mod how_many;
+
+pub use number::significant;
