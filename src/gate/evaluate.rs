@@ -303,29 +303,29 @@ fn at_observed_rate(k: u64, n: u64, least: impl Fn(u64) -> Option<u64>) -> Optio
     least(high)
 }
 
-/// "minimum of time_to_double_s", "share of damping_ratio below 0", …, with the selection.
+/// "minimum of time_to_double_s [jet_damping]", "share of … below 0", with the flight times chosen.
 fn statistic_in_words(gate: &Gate) -> String {
     let selection = &gate.selection;
     let mut of = gate.metric.clone();
     if let Some(variant) = &selection.variant {
-        of += &format!(" [{variant}");
-        if let Some(baseline) = &selection.baseline {
-            of += &format!(" − {baseline}");
-        }
-        of += "]";
+        let baseline = selection.baseline.as_ref().map(|name| format!(" − {name}"));
+        of += &format!(" [{variant}{}]", baseline.unwrap_or_default());
     }
-    match &gate.statistic {
+    let words = match &gate.statistic {
         Statistic::Extreme if gate.limit.sense == Sense::AtLeast => format!("minimum of {of}"),
         Statistic::Extreme => format!("maximum of {of}"),
-        Statistic::ShareBelow { threshold, .. } => {
-            format!("share of {of} below {} {}", threshold.value, threshold.unit)
-        }
-        Statistic::ShareAbove { threshold, .. } => {
-            format!("share of {of} above {} {}", threshold.value, threshold.unit)
-        }
+        Statistic::ShareBelow { threshold, .. } => format!("share of {of} below {threshold}"),
+        Statistic::ShareAbove { threshold, .. } => format!("share of {of} above {threshold}"),
         Statistic::Quantile { level, .. } => format!("{} quantile of {of}", level.get()),
         Statistic::ToleranceBound { coverage, .. } => {
-            format!("bound of {of} kept by {} %", 100.0 * coverage.get())
+            format!("bound of {of} kept by {} of the population", coverage.get())
+        }
+    };
+    match &selection.flight_times_s {
+        None => words,
+        Some(times) => {
+            let times = times.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+            format!("{words} at {times} s")
         }
     }
 }

@@ -7,6 +7,7 @@ use super::verdict::Severity;
 use crate::problem::Problems;
 use crate::stats::{Confidence, Probability};
 use std::collections::BTreeSet;
+use std::fmt;
 
 /// On which side of the limit it is good.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,6 +36,16 @@ impl Quantity {
     /// The number in the unit of the metric.
     pub fn base(&self) -> f64 {
         if self.unit == "percent" { self.value / 100.0 } else { self.value }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.unit.as_str() {
+            "1" => write!(f, "{}", self.value),
+            "percent" => write!(f, "{} %", self.value),
+            unit => write!(f, "{} {unit}", self.value),
+        }
     }
 }
 

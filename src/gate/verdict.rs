@@ -57,7 +57,7 @@ pub enum Severity {
 /// anything the whole is incomplete, since nothing evaluated is not a pass.
 pub fn combine(gates: impl IntoIterator<Item = (Severity, Verdict)>) -> Verdict {
     let gates: Vec<_> = gates.into_iter().collect();
-    let occurs = |verdict| gates.iter().any(|&gate| gate == (Severity::Error, verdict));
+    let occurs = |verdict| gates.contains(&(Severity::Error, verdict));
     let anything_evaluated = gates.iter().any(|&(_, verdict)| verdict != Verdict::Incomplete);
     [Verdict::Fail, Verdict::Incomplete, Verdict::Inconclusive]
         .into_iter()

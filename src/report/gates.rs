@@ -96,7 +96,7 @@ mod tests {
             id: "unstable".into(),
             verdict,
             severity,
-            statistic: "share of damping_ratio below 0 1".into(),
+            statistic: "share of damping_ratio below 0".into(),
             value: Some(69.0),
             bound: Some(70.712_345),
             sense: "at_most",
