@@ -2,7 +2,7 @@
 //!
 //! Verdicts are made in `gate`; who prints the text is decided in `cli`.
 
-use super::significant;
+use super::{percent, significant};
 use crate::gate::{Outcome, Report, Severity, Verdict};
 use comfy_table::{CellAlignment, Table, presets};
 
@@ -46,7 +46,7 @@ pub fn gates(report: &Report) -> String {
     }
     let counted = |wanted| report.gates.iter().filter(|gate| gate.verdict == wanted).count();
     text += &format!(
-        "\n{}: {} gates, {} passed, {} failed, {} inconclusive, {} incomplete",
+        "\n{} ({} in all): {} passed, {} failed, {} inconclusive, {} incomplete",
         report.verdict.name(),
         report.gates.len(),
         counted(Verdict::Pass),
@@ -79,8 +79,8 @@ fn limit(gate: &Outcome) -> String {
     };
     let confidence = gate
         .confidence
-        .map_or(String::new(), |confidence| format!(" at {} %", significant(100.0 * confidence)));
-    format!("{sign} {}{unit}{confidence}", significant(gate.limit))
+        .map_or(String::new(), |confidence| format!(" at {} %", percent(confidence)));
+    format!("{sign} {}{unit}{confidence}", gate.limit)
 }
 
 fn number(value: Option<f64>) -> String {
@@ -126,7 +126,7 @@ mod tests {
             assert!(text.contains(part), "{part} is not in\n{text}");
         }
         assert!(
-            text.ends_with("fail: 1 gates, 0 passed, 1 failed, 0 inconclusive, 0 incomplete\n")
+            text.ends_with("fail (1 in all): 0 passed, 1 failed, 0 inconclusive, 0 incomplete\n")
         );
     }
 

@@ -2,7 +2,7 @@
 //!
 //! The numbers are those of `stats`.
 
-use super::significant;
+use super::{percent, significant};
 use crate::stats::{
     Confidence, Error, Probability, Tails, consumers_risk, least_cases, most_exceedances,
 };
@@ -21,8 +21,8 @@ pub struct Claim {
 
 impl Claim {
     fn words(&self) -> String {
-        let share = significant(100.0 * self.coverage.get());
-        let risk = significant(100.0 * self.confidence.risk());
+        let share = percent(self.coverage.get());
+        let risk = percent(self.confidence.risk());
         let bounds = match self.tails {
             Tails::One => "One bound for",
             Tails::Two => "Two bounds that enclose",
@@ -32,8 +32,8 @@ impl Claim {
 
     fn exceedances(&self) -> &'static str {
         match self.tails {
-            Tails::One => "exceedances allowed",
-            Tails::Two => "exceedances allowed on each side",
+            Tails::One => "exceedances",
+            Tails::Two => "exceedances on each side",
         }
     }
 }
@@ -90,11 +90,7 @@ pub fn exceedances_allowed(claim: &Claim, cases: u64, asked: Option<u64>) -> Res
             format!("{cases} cases are too few for this claim: at least {least} are needed")
         }
     };
-    let header = [
-        claim.exceedances().replace(" allowed", ""),
-        "actual risk, %".into(),
-        "claim holds".into(),
-    ];
+    let header = [claim.exceedances().into(), "actual risk, %".into(), "claim holds".into()];
     Ok(format!("{}\n{answer}\n\n{}\n{INDEPENDENT}", claim.words(), table(header, rows)))
 }
 

@@ -5,4 +5,4 @@ mod number;
 pub mod gates;
 pub mod how_many;
 
-pub use number::significant;
+pub use number::{percent, significant};

@@ -1,4 +1,4 @@
-//! Numbers for people: four significant digits, no trailing zeros.
+//! Numbers for people: four significant digits, no trailing zeros; levels in full.
 
 /// A number with four significant digits; a power of ten where it would be long.
 pub fn significant(value: f64) -> String {
@@ -17,6 +17,12 @@ pub fn significant(value: f64) -> String {
     } else {
         text
     }
+}
+
+/// A level such as a coverage or confidence in percent, to a millionth of one: 0.99865 → 99.865.
+pub fn percent(level: f64) -> String {
+    let text = format!("{:.6}", 100.0 * level);
+    text.trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
 #[cfg(test)]
@@ -38,6 +44,13 @@ mod tests {
             (f64::INFINITY, "inf"),
         ] {
             assert_eq!(significant(value), text);
+        }
+    }
+
+    #[test]
+    fn a_level_keeps_its_digits() {
+        for (level, text) in [(0.99865, "99.865"), (0.1, "10"), (0.9973, "99.73"), (1.0, "100")] {
+            assert_eq!(percent(level), text);
         }
     }
 }
