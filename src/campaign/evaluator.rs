@@ -184,8 +184,7 @@ impl<'a> Evaluator<'a> {
                 evaluations.push(evaluation);
             }
         }
-        let known = |of: &[Option<f64>]| of.iter().map(|v| v.unwrap_or(f64::NAN)).collect();
-        let (values, scores) = (known(&draws.values), known(&draws.scores));
+        let (values, scores) = (draws.values.clone(), draws.scores.clone());
         self.workspaces.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
         Record { population, case, values, scores, evaluations }
     }

@@ -14,9 +14,9 @@ pub struct CaseRow {
     /// Case index inside the population.
     pub case: u64,
     /// Drawn value per draw key; empty if the case panicked.
-    pub values: Vec<f64>,
+    pub values: Vec<Option<f64>>,
     /// Normal score per draw key; empty if the case panicked.
-    pub scores: Vec<f64>,
+    pub scores: Vec<Option<f64>>,
     /// What the scalar metrics are taken from.
     pub reduced: ReducedCase,
     /// The first failure of the case.

@@ -89,9 +89,9 @@ pub fn evaluate(
     Record {
         population,
         case,
-        values: vec![1.0 + 0.01 * score, damping],
+        values: vec![Some(1.0 + 0.01 * score), Some(damping)],
         // A value beyond its law has no score.
-        scores: vec![score, if fixed(1).is_some() { f64::NEG_INFINITY } else { 0.5 * score }],
+        scores: vec![Some(score), fixed(1).is_none().then_some(0.5 * score)],
         evaluations,
     }
 }

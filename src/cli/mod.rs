@@ -7,6 +7,7 @@ pub mod actuator;
 pub mod check;
 pub mod completions;
 pub mod error;
+pub mod how_many;
 pub mod init;
 pub mod modes;
 pub mod nominal;
@@ -53,6 +54,7 @@ enum Command {
     Run(run::Args),
     Summary(summary::Args),
     Replay(replay::Args),
+    HowMany(how_many::Args),
     Planar(planar::Args),
     Actuator(actuator::Args),
     Schema(schema::Args),
@@ -72,6 +74,7 @@ pub fn run() -> ExitCode {
         Command::Run(args) => run::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
+        Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),
         Command::Actuator(args) => actuator::run(args, &mut out),
         Command::Schema(args) => schema::run(args, &mut out),

@@ -1,6 +1,6 @@
 //! `tvse nominal`: the poles of the nominal vehicle.
 
-use super::{Error, PASS, run};
+use super::{Error, PASS};
 use crate::campaign::{Definition, Evaluator, Population};
 use crate::dispersion::Sampler;
 use crate::{io, report};
@@ -33,7 +33,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let sampler = Sampler::new(&loaded.dispersion, definition.seed);
     let vehicle = &loaded.vehicle.vehicle;
     let evaluator = Evaluator::new(vehicle, &sampler, &definition, args.all)
-        .map_err(|error| run::unprepared(&args.run, &error))?;
+        .map_err(|error| super::run::unprepared(&args.run, &error))?;
     let record = evaluator.evaluate(0, 0);
     writeln!(out, "{}\n{}", vehicle.name, report::nominal::table(&definition, &record))?;
     Ok(PASS)

@@ -1,6 +1,6 @@
 //! `tvse replay`: rebuilds one case of a finished run and compares it with what is stored.
 
-use super::{Error, FAIL, PASS, run};
+use super::{Error, FAIL, PASS};
 use crate::campaign::row::{self, ModeRow};
 use crate::campaign::{Evaluator, StoredPoles};
 use crate::dispersion::Sampler;
@@ -69,7 +69,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let all = outline.poles == StoredPoles::All;
     let vehicle = &loaded.vehicle.vehicle;
     let evaluator = Evaluator::new(vehicle, &sampler, definition, all)
-        .map_err(|error| run::unprepared(&run_file, &error))?;
+        .map_err(|error| super::run::unprepared(&run_file, &error))?;
     let mut replay = Replay::default();
     let mut unsolved = Vec::new();
     let record = evaluator.visit(population, args.case, |view| {

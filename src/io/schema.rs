@@ -168,13 +168,13 @@ fn draws(outline: &Outline) -> Vec<Column<CaseRow>> {
     let mut columns = Vec::new();
     for (index, draw) in outline.draws.iter().enumerate() {
         let description = format!("{}; key {}", draw.description, draw.key);
-        let value = move |r: &CaseRow| r.values.get(index).copied();
+        let value = move |r: &CaseRow| r.values.get(index).copied().flatten();
         columns.push(Column::number(&draw.column, &draw.unit, description, value));
     }
     for (index, draw) in outline.draws.iter().enumerate() {
         let description =
             format!("Normal score of {}; NULL for a value beyond its law", draw.column);
-        let score = move |r: &CaseRow| r.scores.get(index).copied();
+        let score = move |r: &CaseRow| r.scores.get(index).copied().flatten();
         columns.push(Column::number(draw.score_column(), "sigma", description, score));
     }
     columns

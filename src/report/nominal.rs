@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, Table, presets};
 /// One row per pole of each evaluation.
 pub fn table(definition: &Definition, record: &Record) -> String {
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_BORDERS_ONLY).set_header([
+    table.load_style(presets::ASCII_MARKDOWN).set_header([
         "time, s", "variant", "mode", "branch", "label", "Re s, rad/s", "Im s, rad/s", "f, Hz",
         "ζ, %", "double, s", "structure", "nozzle",
     ]);
@@ -39,8 +39,10 @@ pub fn table(definition: &Definition, record: &Record) -> String {
             ]);
         }
     }
-    for column in table.column_iter_mut().filter(|c| c.index() == 0 || c.index() >= 5) {
-        column.set_cell_alignment(CellAlignment::Right);
+    for (index, column) in table.column_iter_mut().enumerate() {
+        if index == 0 || index >= 5 {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
     }
     table.to_string()
 }

@@ -1,5 +1,6 @@
 //! What the draws of a run look like beside their laws, as a table for the terminal.
 
+use super::significant;
 use crate::campaign::Definition;
 use crate::dispersion::{Draw, Sampler};
 use crate::stats::Moments;
@@ -18,15 +19,15 @@ pub fn table(definition: &Definition, draws: &[Draw], sampler: &Sampler<'_>) -> 
         }
     }
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_BORDERS_ONLY).set_header([
+    table.load_style(presets::ASCII_MARKDOWN).set_header([
         "draw key", "unit", "law", "mean", "sd", "smallest", "largest",
     ]);
     for (draw, values) in draws.iter().zip(&values) {
         let law = draw.law.range().map_or("unbounded".to_owned(), |[low, high]| {
-            format!("{} to {}", number(low), number(high))
+            format!("{} to {}", significant(low), significant(high))
         });
         let moments = Moments::of(values).ok();
-        let shown = |value: Option<f64>| value.map_or_else(String::new, number);
+        let shown = |value: Option<f64>| value.map_or_else(String::new, significant);
         table.add_row([
             draw.key.clone(),
             draw.unit.to_owned(),
@@ -37,17 +38,8 @@ pub fn table(definition: &Definition, draws: &[Draw], sampler: &Sampler<'_>) -> 
             shown(values.iter().copied().max_by(f64::total_cmp)),
         ]);
     }
-    for column in table.column_iter_mut().filter(|c| c.index() >= 3) {
+    for column in table.column_iter_mut().skip(3) {
         column.set_cell_alignment(CellAlignment::Right);
     }
     format!("{cases} dispersed cases, seed {}, {} draw keys\n{table}\n", definition.seed, draws.len())
-}
-
-/// Four significant digits.
-fn number(value: f64) -> String {
-    if value == 0.0 || (1e-3..1e6).contains(&value.abs()) {
-        format!("{value:.4}")
-    } else {
-        format!("{value:.3e}")
-    }
 }

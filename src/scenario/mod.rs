@@ -9,7 +9,6 @@ pub mod pattern;
 pub mod run;
 pub mod run_file;
 pub mod schema;
-pub use crate::spelling;
 pub mod table;
 pub mod vehicle;
 pub mod vehicle_file;

@@ -22,6 +22,8 @@ pub struct Corner {
     pub mode: usize,
     /// Index of the variant in which it is made least.
     pub variant: usize,
+    /// Indices of the draws whose sides are chosen.
+    pub draws: Vec<usize>,
 }
 
 /// A validated run: its definition, and the corners whose signs are still to be evaluated.
@@ -77,7 +79,7 @@ pub fn resolve(
         let fixed = match corner.signs {
             SignsFile::Given => given(corner, &key, dispersion, f),
             SignsFile::Evaluated => {
-                corners.extend(evaluated(file, corner, &key, populations.len(), f));
+                corners.extend(evaluated(file, corner, &key, populations.len(), dispersion, f));
                 Vec::new()
             }
         };
@@ -194,6 +196,10 @@ fn given(
             f.push(format!("{key}.{name}"), format!("\"{value}\""), allowed);
         }
     }
+    if !corner.keys.is_empty() {
+        let found = format!("{} entries", corner.keys.len());
+        f.push(format!("{key}.keys"), found, "nothing, or signs = \"evaluated\"");
+    }
     if corner.low.is_empty() && corner.high.is_empty() {
         f.push(key, "neither `low` nor `high`", "at least one entry in `low` or `high`");
     }
@@ -203,29 +209,45 @@ fn given(
     {
         for (i, entry) in entries.iter().enumerate() {
             let place = format!("{key}.{list}[{i}]");
-            let mut matched = false;
-            for (draw, chosen) in dispersion.draws().iter().zip(&mut sides) {
-                let path = draw.key.split(" @ ").next().unwrap_or(&draw.key);
-                if draw.worst.is_none() || !(draw.key == *entry || pattern::matches(entry, path)) {
-                    continue;
+            let mut twice = Vec::new();
+            matching(entry, &place, dispersion, f, |draw| {
+                if sides[draw].is_some_and(|other| other != side) {
+                    twice.push(draw);
                 }
-                matched = true;
-                if chosen.is_some_and(|other| other != side) {
-                    let found = format!("\"{}\", which is in `low` as well", draw.key);
-                    f.push(&place, found, "each key on one side");
-                }
-                *chosen = Some(side);
-            }
-            if !matched {
-                let known = dispersion.draws().iter().filter(|d| d.worst.is_some());
-                let allowed = allowed_instead(entry, known.map(|d| d.key.as_str()));
-                let found = format!("\"{entry}\", which matches no draw key with `worst` values");
-                f.push(&place, found, allowed);
+                sides[draw] = Some(side);
+            });
+            for draw in twice {
+                let found = format!("\"{}\", which is in `low` as well", dispersion.draws()[draw].key);
+                f.push(&place, found, "each key on one side");
             }
         }
     }
     let values = dispersion.draws().iter().zip(sides).enumerate();
     values.filter_map(|(i, (draw, side))| Some((i, draw.worst?[side?]))).collect()
+}
+
+/// Hands every draw that has `worst` values and that `entry` means (a whole key, or a parameter path
+/// with `*`) to `take`; none at all is a problem at `place`.
+fn matching(
+    entry: &str,
+    place: &str,
+    dispersion: &Dispersion,
+    f: &mut Findings,
+    mut take: impl FnMut(usize),
+) {
+    let mut matched = false;
+    for (index, draw) in dispersion.draws().iter().enumerate() {
+        let path = draw.key.split(" @ ").next().unwrap_or(&draw.key);
+        if draw.worst.is_some() && (draw.key == entry || pattern::matches(entry, path)) {
+            matched = true;
+            take(index);
+        }
+    }
+    if !matched {
+        let known = dispersion.draws().iter().filter(|d| d.worst.is_some());
+        let allowed = allowed_instead(entry, known.map(|d| d.key.as_str()));
+        f.push(place, format!("\"{entry}\", which matches no draw key with `worst` values"), allowed);
+    }
 }
 
 /// A corner whose signs are evaluated.
@@ -234,6 +256,7 @@ fn evaluated(
     corner: &CornerFile,
     key: &str,
     population: usize,
+    dispersion: Option<&Dispersion>,
     f: &mut Findings,
 ) -> Option<Corner> {
     for (list, entries) in [("low", &corner.low), ("high", &corner.high)] {
@@ -255,5 +278,17 @@ fn evaluated(
     let mode = index("mode", &corner.mode, modes);
     let variants = file.variant.iter().map(|v| v.name.as_str()).collect();
     let variant = index("variant", &corner.variant, variants);
-    Some(Corner { population, name: corner.name.clone(), mode: mode?, variant: variant? })
+    let mut chosen = vec![false; dispersion.map_or(0, |d| d.draws().len())];
+    if let Some(dispersion) = dispersion {
+        for (i, entry) in corner.keys.iter().enumerate() {
+            matching(entry, &format!("{key}.keys[{i}]"), dispersion, f, |draw| chosen[draw] = true);
+        }
+        if corner.keys.is_empty() {
+            for (chosen, draw) in chosen.iter_mut().zip(dispersion.draws()) {
+                *chosen = draw.worst.is_some();
+            }
+        }
+    }
+    let draws = chosen.iter().enumerate().filter_map(|(i, chosen)| chosen.then_some(i)).collect();
+    Some(Corner { population, name: corner.name.clone(), mode: mode?, variant: variant?, draws })
 }

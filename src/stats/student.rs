@@ -13,26 +13,27 @@ fn central(freedom: u64, theta: f64) -> (f64, f64) {
     let (sine, cosine) = theta.sin_cos();
     let square = cosine * cosine;
     let odd = freedom % 2 == 1;
-    // Terms cos θ · 2/3 cos²θ · 4/5 cos²θ … (odd ν) or 1 · 1/2 cos²θ · 3/4 cos²θ … (even ν).
-    let mut term = if odd { cosine } else { 1.0 };
+    // The series cos θ + 2/3 cos³θ + 2·4/(3·5) cos⁵θ … (odd ν), 1 + 1/2 cos²θ + 1·3/(2·4) cos⁴θ …
+    // (even ν), up to cosᵛ⁻²θ; and the factor 2 Γ((ν+1)/2) / (√π Γ(ν/2)) of the derivative.
+    let (first, mut term, mut factor) =
+        if odd { (1, cosine, std::f64::consts::FRAC_2_PI) } else { (2, 1.0, 1.0) };
     let mut sum = 0.0;
-    // Γ((ν+1)/2)/Γ(ν/2), which doubles as the derivative's factor, grows by (ν+1)/ν every two ν.
-    let mut factor = if odd { std::f64::consts::FRAC_2_PI } else { 1.0 };
-    let first = if odd { 1 } else { 2 };
     for nu in (first..freedom).step_by(2) {
-        let nu = nu as f64;
         sum += term;
-        term *=
-            square * (nu + if odd { 1.0 } else { -1.0 + 0.0 }) / (nu + if odd { 2.0 } else { 0.0 });
-        factor *= (nu + 1.0) / nu;
+        let below = (if odd { nu + 2 } else { nu }) as f64;
+        term *= square * (below - 1.0) / below;
+        factor *= (nu + 1) as f64 / nu as f64;
     }
     let probability =
         if odd { std::f64::consts::FRAC_2_PI * (theta + sine * sum) } else { sine * (sum + term) };
-    (probability, factor * cosine.powi(freedom as i32 - 1))
+    (probability, factor * cosine.powf((freedom - 1) as f64))
 }
 
-/// The t that is exceeded with probability `risk` (below one half), `freedom` at least 1.
+/// The t that is exceeded with probability `risk`, `freedom` at least 1.
 pub(super) fn upper_point(freedom: u64, risk: f64) -> f64 {
+    if risk > 0.5 {
+        return -upper_point(freedom, 1.0 - risk);
+    }
     if freedom > EXPANSION {
         return expansion(freedom, normal::upper_point(risk));
     }
@@ -73,6 +74,13 @@ mod tests {
                 // The tail is a difference from 1: relative error ε/risk.
                 assert!((point / exact - 1.0).abs() < 10.0 * f64::EPSILON / risk, "{freedom}");
             }
+        }
+    }
+
+    #[test]
+    fn lower_points_mirror_upper_ones() {
+        for freedom in [1, 6, 5000] {
+            assert_eq!(upper_point(freedom, 0.75), -upper_point(freedom, 0.25));
         }
     }
 
