@@ -4,6 +4,7 @@
 //! returns the exit code. Nothing here computes.
 
 pub mod error;
+pub mod modes;
 
 pub use error::Error;
 
@@ -31,13 +32,17 @@ struct Arguments {
 }
 
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    Modes(modes::Args),
+}
 
 /// Parses the arguments of the process, runs the command and returns the exit code.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let mut out = std::io::stdout().lock();
-    let result: Result<u8, Error> = match arguments.command {};
+    let result: Result<u8, Error> = match arguments.command {
+        Command::Modes(args) => modes::run(&args, &mut out),
+    };
     let code = result.unwrap_or_else(|error: Error| {
         eprintln!("{error}");
         error.code()

@@ -149,8 +149,7 @@ impl Table {
             )]));
         let (mut fields, mut arrays): (Vec<Field>, Vec<ArrayRef>) = (Vec::new(), Vec::new());
         for (Column(name, holds, description), values) in layout.columns.iter().zip(&self.columns) {
-            let mut facts =
-                HashMap::from([("description".to_owned(), (*description).to_owned())]);
+            let mut facts = HashMap::from([("description".to_owned(), (*description).to_owned())]);
             if let Holds::Number(unit) = holds {
                 facts.insert("unit".to_owned(), (*unit).to_owned());
             }
@@ -193,9 +192,11 @@ impl Table {
         };
         // The column types come from Parquet itself, not from what a writer noted about Arrow.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let builder =
-            ParquetRecordBatchReaderBuilder::try_new_with_options(bytes::Bytes::from(bytes), options)
-                .map_err(|e| damage(&e))?;
+        let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(
+            bytes::Bytes::from(bytes),
+            options,
+        )
+        .map_err(|e| damage(&e))?;
         let metadata = builder.metadata().clone();
         let rows = metadata.file_metadata().num_rows();
         let size = (metadata.row_groups().iter())

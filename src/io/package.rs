@@ -194,19 +194,7 @@ fn tables(modal: &Modal) -> [Table; 5] {
         let (cg, i) = (set.body.cg_m, set.body.inertia_kg_m2);
         mass.push(
             &[],
-            &[
-                time,
-                set.body.mass_kg,
-                cg.x,
-                cg.y,
-                cg.z,
-                i.m11,
-                i.m22,
-                i.m33,
-                i.m12,
-                i.m13,
-                i.m23,
-            ],
+            &[time, set.body.mass_kg, cg.x, cg.y, cg.z, i.m11, i.m22, i.m33, i.m12, i.m13, i.m23],
         );
         for grid in &set.grids {
             let mut row = vec![time];
@@ -348,7 +336,14 @@ struct Check<'a> {
 
 impl Check<'_> {
     /// Notes a problem of a table, unless many of its kind are noted already.
-    fn note(&mut self, kind: Kind, layout: &Layout, key: &'static str, found: String, allowed: &str) {
+    fn note(
+        &mut self,
+        kind: Kind,
+        layout: &Layout,
+        key: &'static str,
+        found: String,
+        allowed: &str,
+    ) {
         let file = files::name(&self.dir.join(table_path(layout)));
         let count = self.counts.entry((layout.name, key)).or_default();
         *count += 1;
@@ -372,17 +367,7 @@ impl Check<'_> {
         }
         let sets = (0..table.rows()).map(|row| {
             let n = |column: usize| table.numbers(column)[row];
-            let inertia = Matrix3::new(
-                n(5),
-                n(8),
-                n(9),
-                n(8),
-                n(6),
-                n(10),
-                n(9),
-                n(10),
-                n(7),
-            );
+            let inertia = Matrix3::new(n(5), n(8), n(9), n(8), n(6), n(10), n(9), n(10), n(7));
             if !(n(1) > 0.0) {
                 self.note(Kind::Input, &MASS, "mass_kg", n(1).to_string(), "above 0");
             }
@@ -433,9 +418,7 @@ impl Check<'_> {
                 self.note(Kind::Damage, &GRIDS, "grid", found, "each grid once a time");
                 continue;
             }
-            let vector = |first: usize| {
-                Vector3::from_fn(|i, _| table.numbers(first + i)[row])
-            };
+            let vector = |first: usize| Vector3::from_fn(|i, _| table.numbers(first + i)[row]);
             let (mass_kg, inertia_kg_m2) = (vector(5), vector(8));
             if !(mass_kg.min() >= 0.0 && inertia_kg_m2.min() >= 0.0) {
                 let found = format!("a negative mass or inertia at `{name}`, {time} s");

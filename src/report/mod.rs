@@ -1,1 +1,3 @@
 //! Reports: from values to text for people.
+
+pub mod modes;

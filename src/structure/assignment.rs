@@ -7,16 +7,25 @@
 ///
 /// Every row of the smaller side gets a partner, whatever the score; cost is cubic in the larger
 /// side. Method: H. W. Kuhn (1955), in the form with potentials and one augmenting path a row.
-pub fn assign(rows: usize, columns: usize, score: impl Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
-    if rows > columns {
-        let mut partner = vec![None; rows];
-        for (column, row) in assign(columns, rows, |c, r| score(r, c)).into_iter().enumerate() {
-            if let Some(row) = row {
-                partner[row] = Some(column);
-            }
-        }
-        return partner;
+pub fn assign(
+    rows: usize,
+    columns: usize,
+    score: impl Fn(usize, usize) -> f64,
+) -> Vec<Option<usize>> {
+    if rows <= columns {
+        return place(rows, columns, score);
     }
+    let mut partner = vec![None; rows];
+    for (column, row) in place(columns, rows, |c, r| score(r, c)).into_iter().enumerate() {
+        if let Some(row) = row {
+            partner[row] = Some(column);
+        }
+    }
+    partner
+}
+
+/// [`assign`] for at most as many rows as columns.
+fn place(rows: usize, columns: usize, score: impl Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
     // Column 0 is a fictitious one that holds the row being placed; real columns count from 1.
     let mut row_potential = vec![0.0; rows];
     let mut column_potential = vec![0.0; columns + 1];

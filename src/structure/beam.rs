@@ -55,12 +55,8 @@ pub fn stiffness_at(s: f64, h: f64, section: &Properties, e_pa: f64, g_pa: f64) 
 pub fn mass_at(s: f64, h: f64, density: &Density) -> Local {
     let linear = [1.0 - s, s];
     let (s2, s3) = (s * s, s * s * s);
-    let cubic = [
-        1.0 - 3.0 * s2 + 2.0 * s3,
-        h * (s - 2.0 * s2 + s3),
-        3.0 * s2 - 2.0 * s3,
-        h * (s3 - s2),
-    ];
+    let cubic =
+        [1.0 - 3.0 * s2 + 2.0 * s3, h * (s - 2.0 * s2 + s3), 3.0 * s2 - 2.0 * s3, h * (s3 - s2)];
     square(&along(0, linear)) * density.axial_kg_m
         + square(&along(3, linear)) * density.torsion_kg_m
         + (square(&in_xy(cubic)) + square(&in_xz(cubic))) * density.lateral_kg_m

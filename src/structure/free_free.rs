@@ -77,8 +77,7 @@ pub fn free_free(model: &Weighed, limit: f64, count: usize) -> Result<FreeFree, 
         .count();
     // A cluster of eigenvalues is oriented as a whole, even where the count cuts through it.
     let solved = kept + orientation::cut(&mu[kept.saturating_sub(1)..elastic.max(kept)], kept);
-    let mut shapes =
-        Mat::from_fn(n, solved, |i, j| eigen.U()[(i, n - 1 - j)] / mu[j].sqrt());
+    let mut shapes = Mat::from_fn(n, solved, |i, j| eigen.U()[(i, n - 1 - j)] / mu[j].sqrt());
     solve_upper_triangular_in_place(c.transpose(), shapes.as_mut(), Par::Seq);
     let mut omega2: Vec<f64> = mu[..solved].iter().map(|mu| 1.0 / mu).collect();
     for (j, &omega2) in omega2.iter().enumerate() {
@@ -91,6 +90,7 @@ pub fn free_free(model: &Weighed, limit: f64, count: usize) -> Result<FreeFree, 
     orientation::orient(&omega2, &mut shapes, model);
     omega2.truncate(kept);
     shapes.truncate(n, kept);
+    clear_round_off(&mut shapes, m);
     let rigid = Rigid {
         count: 6,
         strain: greatest_strain(k, rigid_shapes.as_ref()),
@@ -119,6 +119,20 @@ fn rigid_shapes(model: &Weighed) -> Result<Mat<f64>, Error> {
     Ok(&shapes * Mat::from_fn(6, 6, |i, j| inverse[(i, j)]))
 }
 
+/// Sets to zero what is no more than round-off beside the unit generalised mass, so that motions
+/// which symmetry forbids are exactly zero.
+fn clear_round_off(shapes: &mut Mat<f64>, m: MatRef<'_, f64>) {
+    let n = m.nrows();
+    let floor = (n as f64 * f64::EPSILON).powi(2);
+    for j in 0..shapes.ncols() {
+        for i in 0..n {
+            if m[(i, i)] * shapes[(i, j)].powi(2) <= floor && m[(i, i)] > 0.0 {
+                shapes[(i, j)] = 0.0;
+            }
+        }
+    }
+}
+
 fn greatest_strain(k: MatRef<'_, f64>, shapes: MatRef<'_, f64>) -> f64 {
     let force = k * shapes;
     (0..shapes.ncols())
@@ -137,9 +151,8 @@ fn greatest_strain(k: MatRef<'_, f64>, shapes: MatRef<'_, f64>) -> f64 {
 /// eigenvalues of K' scaled to a unit diagonal.
 fn mechanism(model: &Weighed, held: MatRef<'_, f64>) -> Error {
     let n = held.nrows();
-    let scale: Vec<f64> = (0..n)
-        .map(|i| if held[(i, i)] > 0.0 { 1.0 / held[(i, i)].sqrt() } else { 1.0 })
-        .collect();
+    let scale: Vec<f64> =
+        (0..n).map(|i| if held[(i, i)] > 0.0 { 1.0 / held[(i, i)].sqrt() } else { 1.0 }).collect();
     let scaled = Mat::from_fn(n, n, |i, j| held[(i, j)] * scale[i] * scale[j]);
     let Ok(eigen) = scaled.self_adjoint_eigen(Side::Lower) else {
         return Error::NoConvergence;

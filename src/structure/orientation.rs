@@ -36,9 +36,8 @@ pub(super) fn cut(mu: &[f64], kept: usize) -> usize {
 pub(super) fn orient(omega2: &[f64], shapes: &mut Mat<f64>, model: &Weighed) {
     let mut start = 0;
     while start < omega2.len() {
-        let more = (omega2[start..].windows(2))
-            .take_while(|w| w[1] - w[0] <= CLUSTER * w[1])
-            .count();
+        let more =
+            (omega2[start..].windows(2)).take_while(|w| w[1] - w[0] <= CLUSTER * w[1]).count();
         if more > 0 {
             rotate(shapes, start, more + 1, model);
         }
@@ -105,8 +104,8 @@ const WAVES: usize = 16;
 fn fields(model: &Weighed) -> Vec<Col<f64>> {
     let extent = |axis: usize| {
         let values = model.positions_m.iter().map(|p| p[axis]);
-        let (least, most) = values
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+        let (least, most) =
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
         (0.5 * (least + most), most - least)
     };
     let (cx, lx) = extent(0);

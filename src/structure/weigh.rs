@@ -39,9 +39,8 @@ pub fn weigh(stick: &Stick, time_s: f64) -> Result<Weighed, Error> {
     let n = FREEDOMS * stick.nodes.len();
     let (mut mass, mut stiffness) = (Mat::zeros(n, n), Mat::zeros(n, n));
     let mut sum = Sum::default();
-    let mut grids: Vec<Grid> = (stick.nodes.iter())
-        .map(|node| massless_grid(&node.name, node.position_m))
-        .collect();
+    let mut grids: Vec<Grid> =
+        (stick.nodes.iter()).map(|node| massless_grid(&node.name, node.position_m)).collect();
     let mut links: Vec<_> = (0..stick.nodes.len()).map(|i| (i, Vector3::zeros())).collect();
 
     for element in &stick.elements {
@@ -55,10 +54,10 @@ pub fn weigh(stick: &Stick, time_s: f64) -> Result<Weighed, Error> {
         add_local(&mut stiffness, &local, element.nodes, &element.axes);
     }
     for line in &stick.line_masses {
-        let at_time = line.mass_kg.at(time_s).ok_or_else(|| Error::Time {
-            time_s,
-            what: line.name.clone(),
-        })?;
+        let at_time = line
+            .mass_kg
+            .at(time_s)
+            .ok_or_else(|| Error::Time { time_s, what: line.name.clone() })?;
         let kept = at_time - if stick.slosh_in_body { 0.0 } else { line.slosh_kg };
         let [from, to] = line.stations_m;
         // A settled liquid stands against the end of its range with its surface upstream.
@@ -106,10 +105,10 @@ pub fn weigh(stick: &Stick, time_s: f64) -> Result<Weighed, Error> {
         }
     }
     for point in &stick.point_masses {
-        let m = point.mass_kg.at(time_s).ok_or_else(|| Error::Time {
-            time_s,
-            what: point.name.clone(),
-        })?;
+        let m = point
+            .mass_kg
+            .at(time_s)
+            .ok_or_else(|| Error::Time { time_s, what: point.name.clone() })?;
         let arm = point.position_m - stick.nodes[point.node].position_m;
         let inertia = Matrix3::from_diagonal(&point.inertia_kg_m2);
         let link = rigid_link(arm);
@@ -130,8 +129,7 @@ pub fn weigh(stick: &Stick, time_s: f64) -> Result<Weighed, Error> {
         let mut own = Matrix6::zeros();
         own.fixed_view_mut::<3, 3>(0, 0).set_diagonal(&spring.translation_n_m);
         own.fixed_view_mut::<3, 3>(3, 3).set_diagonal(&spring.rotation_n_m_rad);
-        let link =
-            spring.nodes.map(|i| rigid_link(spring.position_m - stick.nodes[i].position_m));
+        let link = spring.nodes.map(|i| rigid_link(spring.position_m - stick.nodes[i].position_m));
         for (i, j, sign) in [(0, 0, 1.0), (1, 1, 1.0), (0, 1, -1.0), (1, 0, -1.0)] {
             let block = link[i].transpose() * own * link[j] * sign;
             add_block(&mut stiffness, spring.nodes[i], spring.nodes[j], &block);
