@@ -3,7 +3,14 @@
 //! One file a command: each has its clap `Args` and a `run` that writes to the given output and
 //! returns the exit code. Nothing here computes.
 
+pub mod actuator;
+pub mod check;
+pub mod completions;
 pub mod error;
+pub mod init;
+pub mod modes;
+pub mod planar;
+pub mod schema;
 
 pub use error::Error;
 
@@ -31,13 +38,29 @@ struct Arguments {
 }
 
 #[derive(Subcommand)]
-enum Command {}
+enum Command {
+    Init(init::Args),
+    Check(check::Args),
+    Modes(modes::Args),
+    Planar(planar::Args),
+    Actuator(actuator::Args),
+    Schema(schema::Args),
+    Completions(completions::Args),
+}
 
 /// Parses the arguments of the process, runs the command and returns the exit code.
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let mut out = std::io::stdout().lock();
-    let result: Result<u8, Error> = match arguments.command {};
+    let result: Result<u8, Error> = match &arguments.command {
+        Command::Init(args) => init::run(args, &mut out),
+        Command::Check(args) => check::run(args, &mut out),
+        Command::Modes(args) => modes::run(args, &mut out),
+        Command::Planar(args) => planar::run(args, &mut out),
+        Command::Actuator(args) => actuator::run(args, &mut out),
+        Command::Schema(args) => schema::run(args, &mut out),
+        Command::Completions(args) => completions::run(args, &mut out),
+    };
     let code = result.unwrap_or_else(|error: Error| {
         eprintln!("{error}");
         error.code()

@@ -25,7 +25,7 @@ pub struct Reference {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// The pole with its vectors.
-    pub pair: Pair,
+    pub reference: Reference,
     /// Two-sided overlap `(w₀ᴴ v)(wᴴ v₀) / ((w₀ᴴ v₀)(wᴴ v))` of the state-space vectors, −; over
     /// all poles of a model, conjugates included, the overlaps add up to one.
     pub overlap: c64,
@@ -129,7 +129,7 @@ impl Reference {
     }
 }
 
-/// The poles of `model` that overlap with `reference`, best first; at least one.
+/// The poles of `model` that overlap with `reference`, best first; none if there is no pole.
 ///
 /// Poles are tried from the nearest to the predicted one outwards until the overlaps account for
 /// all but a small rest.
@@ -138,26 +138,24 @@ fn candidates(
     model: &Model,
     poles: &[c64],
     reference: &Reference,
-) -> Vec<(Candidate, Reference)> {
+) -> Vec<Candidate> {
     let guess = reference.predict(model);
     let mut order: Vec<c64> = poles.to_vec();
     order.sort_by(|a, b| (a - guess).norm().total_cmp(&(b - guess).norm()));
-    let mut found: Vec<(Candidate, Reference)> = Vec::new();
+    let mut found: Vec<Candidate> = Vec::new();
     let mut rest = c64::new(1.0, 0.0);
     for pole in order {
-        let pair = solver.pair(model, pole);
-        let other = Reference::new(model, pair.clone());
+        let other = Reference::new(model, solver.pair(model, pole));
         let overlap = reference.overlap(&other);
         rest -= overlap;
-        let overlap_norm = overlap.norm();
-        if overlap_norm.is_finite() {
-            found.push((Candidate { pair, overlap }, other));
+        if overlap.norm().is_finite() {
+            found.push(Candidate { reference: other, overlap });
         }
         if found.len() >= 2 && rest.norm() <= UNACCOUNTED {
             break;
         }
     }
-    found.sort_by(|a, b| b.0.overlap.norm().total_cmp(&a.0.overlap.norm()));
+    found.sort_by(|a, b| b.overlap.norm().total_cmp(&a.overlap.norm()));
     found
 }
 
@@ -181,13 +179,14 @@ pub fn follow(
         let next = (done + step).min(1.0);
         path(next, model);
         solver.poles(model, &mut poles)?;
-        let best = candidates(solver, model, &poles, &reference).swap_remove(0);
-        let overlap = best.0.overlap.norm();
+        let found = candidates(solver, model, &poles, &reference).into_iter().next();
+        let best = found.ok_or(Lost::Overlap { best: 0.0, least: LEAST_OVERLAP })?;
+        let overlap = best.overlap.norm();
         if overlap >= STEP_OVERLAP || step <= LEAST_STEP {
             if !(overlap >= LEAST_OVERLAP) {
                 return Err(Lost::Overlap { best: overlap, least: LEAST_OVERLAP });
             }
-            reference = best.1;
+            reference = best.reference;
             done = next;
             step *= 2.0;
         } else {
@@ -213,27 +212,29 @@ pub fn identify(
     poles: &[c64],
     exchange_ratio: f64,
     scratch: &mut Model,
-) -> Result<(Identity, Vec<Reference>), Lost> {
+) -> Result<Identity, Lost> {
     let mut found = candidates(solver, case, poles, reference).into_iter();
-    let (best, best_reference) =
-        found.next().ok_or(Lost::Overlap { best: 0.0, least: LEAST_OVERLAP })?;
-    let least = best.overlap.norm();
-    if !(least >= LEAST_OVERLAP) {
-        return Err(Lost::Overlap { best: least, least: LEAST_OVERLAP });
+    let best = found.next().ok_or(Lost::Overlap { best: 0.0, least: LEAST_OVERLAP })?;
+    let most = best.overlap.norm();
+    if !(most >= LEAST_OVERLAP) {
+        return Err(Lost::Overlap { best: most, least: LEAST_OVERLAP });
     }
-    let rival = found.next().filter(|(rival, _)| rival.overlap.norm() >= exchange_ratio * least);
-    let Some((rival, rival_reference)) = rival else {
-        return Ok((Identity { primary: best, partner: None }, vec![best_reference]));
+    let rival = found.next().filter(|rival| rival.overlap.norm() >= exchange_ratio * most);
+    let Some(rival) = rival else {
+        return Ok(Identity { primary: best, partner: None });
     };
     let end = follow(solver, reference.clone(), scratch, |t, model| model.blend(nominal, case, t))?;
-    let distance = |candidate: &Candidate| (candidate.pair.pole - end.pair.pole).norm();
-    if distance(&rival) < distance(&best) {
-        let identity = Identity { primary: rival, partner: Some(best) };
-        Ok((identity, vec![rival_reference, best_reference]))
-    } else {
-        let identity = Identity { primary: best, partner: Some(rival) };
-        Ok((identity, vec![best_reference, rival_reference]))
+    // The path ends in the case itself, so that its last pole is one of the case's, bit for bit.
+    let at_end = |candidate: &Candidate| candidate.reference.pair.pole == end.pair.pole;
+    if at_end(&best) {
+        return Ok(Identity { primary: best, partner: Some(rival) });
     }
+    let primary = if at_end(&rival) {
+        rival
+    } else {
+        Candidate { overlap: reference.overlap(&end), reference: end }
+    };
+    Ok(Identity { primary, partner: Some(best) })
 }
 
 /// The nominal pole of the elastic coordinate `label`: continuation of a factor 0→1 on engine mass
@@ -351,10 +352,9 @@ mod tests {
         let mut poles = Vec::new();
         solver.poles(&crossed, &mut poles).expect("solved");
         let mut scratch = Model::zeros(3);
-        let (identity, _) =
-            identify(&mut solver, &start, &nominal, &crossed, &poles, 0.5, &mut scratch)
-                .expect("found");
-        assert!((identity.primary.pair.pole.im - 1.1).abs() < 1e-3);
+        let identity = identify(&mut solver, &start, &nominal, &crossed, &poles, 0.5, &mut scratch)
+            .expect("found");
+        assert!((identity.primary.reference.pair.pole.im - 1.1).abs() < 1e-3);
         assert!(identity.primary.overlap.norm() > 0.99);
         assert!(identity.partner.is_none());
     }
@@ -368,7 +368,7 @@ mod tests {
         let mut poles = Vec::new();
         solver.poles(&veering, &mut poles).expect("solved");
         let mut scratch = Model::zeros(3);
-        let (identity, _) =
+        let identity =
             identify(&mut solver, &start, &nominal, &veering, &poles, 0.05, &mut scratch)
                 .expect("found");
         assert!(identity.partner.is_some());

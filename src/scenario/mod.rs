@@ -1,5 +1,17 @@
 //! Scenario: from the text of the input files to validated values, with all problems at once.
 
 pub mod dispersion;
-pub use crate::spelling;
+#[cfg(test)]
+mod fixture;
+pub mod gimbal;
+pub mod names;
+pub mod pattern;
+pub mod run;
+pub mod run_file;
+pub mod schema;
 pub mod table;
+pub mod vehicle;
+pub mod vehicle_file;
+
+pub use run::{Corner, Run};
+pub use vehicle::Resolved;

@@ -3,8 +3,8 @@
 //! The schema is derived from the raw type, so what `tvse schema` prints is what is checked here.
 //! What values mean together is not known here: the caller checks it and adds to the [`Findings`].
 
-use super::spelling;
 use crate::problem::{Kind, Problems};
+use crate::spelling;
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde_json::Value as Json;

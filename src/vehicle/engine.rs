@@ -1,6 +1,6 @@
 //! An engine: a vectored nozzle on a gimbal, with its actuators and its flow path.
 
-use super::{Actuator, Motor};
+use super::{Actuator, Bearing, Motor};
 use nalgebra::{Matrix3x2, Vector3};
 use std::sync::Arc;
 
@@ -32,6 +32,25 @@ pub struct Nozzle {
     pub length_m: f64,
     /// Liner ablation, if any.
     pub ablation: Option<Ablation>,
+}
+
+impl Nozzle {
+    /// The nozzle after the share `a·b` of the liner loss (ablation factor times burned propellant
+    /// fraction, −); the nozzle itself where it has no ablation.
+    pub fn ablated(&self, share: f64) -> Self {
+        let Some(loss) = self.ablation else { return *self };
+        Self {
+            mass_kg: self.mass_kg - share * loss.mass_loss_kg,
+            cg_m: self.cg_m + share * loss.cg_change_m,
+            inertia_kg_m2: self.inertia_kg_m2 - share * loss.inertia_loss_kg_m2,
+            ..*self
+        }
+    }
+
+    /// Transverse inertia about the nozzle's own cg `J_c = J_G − m r²`, kg·m².
+    pub fn central_inertia_kg_m2(&self) -> f64 {
+        self.inertia_kg_m2 - self.mass_kg * self.cg_m * self.cg_m
+    }
 }
 
 /// One engine of the vehicle.
@@ -67,5 +86,22 @@ impl Engine {
     /// `group.name`, the instance path of the engine.
     pub fn path(&self) -> String {
         format!("{}.{}", self.group, self.name)
+    }
+
+    /// Nominal stiffness, N·m/rad, and damping, N·m·s/rad, on the gimbal rotation `axis`: the
+    /// actuator's `K_a` and `C_a = 2ζ√(J_ref K_a)`, and the flex bearing, its stiffness only where
+    /// the actuator does not include it.
+    pub fn gimbal_stiffness_and_damping(&self, axis: usize) -> (f64, f64) {
+        let actuator = &self.actuators[axis];
+        let law = &actuator.law;
+        let separate = match actuator.bearing {
+            Bearing::Included => 0.0,
+            Bearing::Separate => self.bearing_stiffness_n_m_rad,
+        };
+        let critical = (law.reference_inertia_kg_m2 * law.stiffness_n_m_rad).sqrt();
+        (
+            law.stiffness_n_m_rad + separate,
+            2.0 * law.damping_ratio * critical + self.bearing_damping_n_m_s_rad,
+        )
     }
 }

@@ -22,8 +22,9 @@ pub struct Grid {
     pub name: String,
     /// Position in the structural frame, m.
     pub position_m: Vector3<f64>,
-    /// Lumped mass that weighs the overlap of modes, kg; zero where unknown.
-    pub mass_kg: f64,
+    /// Lumped mass in x, y, z that weighs the overlap of modes, kg; zero where unknown. It differs
+    /// by direction where a liquid moves sideways with its tank, but not along it.
+    pub mass_kg: Vector3<f64>,
     /// Lumped rotary inertias (x, y, z) that weigh the overlap, kg·m²; zero where unknown.
     pub inertia_kg_m2: Vector3<f64>,
 }

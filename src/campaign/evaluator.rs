@@ -1,0 +1,387 @@
+//! The evaluator of cases: everything that no draw changes is prepared once, then each case is a
+//! function of its population and index alone.
+//!
+//! It stores nothing and knows no files; `pool` runs it in parallel.
+
+use super::draw::Slots;
+use super::{Branch, Definition, Evaluation, Failure, FailureKind, Pole, Record, Variant};
+use crate::dispersion::{Affine, Dispersion, Draws, Sampler};
+use crate::dynamics::{DrawnVehicle, Effects, Model, Plant};
+use crate::modal::{self, Reference, Solver, eigen, identify};
+use crate::vehicle::Vehicle;
+use nalgebra::Complex;
+use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
+
+/// Largest relative residual of an eigenpair, in units of n ε.
+const RESIDUAL_FACTOR: f64 = 1e3;
+
+/// Why an evaluator could not be prepared.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// A flight time of the run is not in the modal package.
+    #[error("the modal package has no flight time {0} s")]
+    MissingTime(f64),
+    /// A mode of interest has no label at a flight time.
+    #[error("mode `{mode}` has no label at {time_s} s")]
+    MissingMode {
+        /// Name of the mode.
+        mode: String,
+        /// Flight time, s.
+        time_s: f64,
+    },
+    /// The geometry of an engine is not usable.
+    #[error("{0}")]
+    Plant(#[from] super::plant::Error),
+    /// The nominal vehicle is impossible.
+    #[error("the nominal vehicle at {time_s} s: {failure}")]
+    Nominal {
+        /// Flight time, s.
+        time_s: f64,
+        /// Why.
+        failure: Failure,
+    },
+    /// The nominal pole of a mode could not be reached by continuation.
+    #[error("mode `{mode}` at {time_s} s, variant `{variant}`: {lost}")]
+    Lost {
+        /// Name of the mode.
+        mode: String,
+        /// Flight time, s.
+        time_s: f64,
+        /// Name of the variant.
+        variant: String,
+        /// Why.
+        lost: identify::Lost,
+    },
+}
+
+/// One variant at one flight time.
+pub struct AtVariant {
+    /// Index of the plant among those of the flight time.
+    plant: usize,
+    /// What acts.
+    effects: Effects,
+    /// Model of the nominal vehicle.
+    pub nominal: Model,
+    /// Nominal pole of every mode of interest.
+    pub references: Vec<Reference>,
+}
+
+/// What is prepared at one flight time.
+pub struct AtTime {
+    /// Flight time, s.
+    pub flight_time_s: f64,
+    /// One plant per kind of gimbal slope in use.
+    plants: Vec<Plant>,
+    /// From draws to the drawn vehicle.
+    slots: Slots,
+    /// Label of every mode of interest.
+    pub labels: Vec<String>,
+    /// Variants, in the order of the definition.
+    pub variants: Vec<AtVariant>,
+}
+
+impl AtTime {
+    /// The plant that a variant uses.
+    pub fn plant(&self, variant: usize) -> &Plant {
+        &self.plants[self.variants[variant].plant]
+    }
+}
+
+/// Buffers of one worker.
+struct Workspace {
+    solvers: Vec<(usize, Solver)>,
+    draws: Draws,
+    vehicle: DrawnVehicle,
+    poles: Vec<Complex<f64>>,
+}
+
+impl Workspace {
+    fn solver(&mut self, coordinates: usize) -> usize {
+        let known = self.solvers.iter().position(|(size, _)| *size == coordinates);
+        known.unwrap_or_else(|| {
+            self.solvers.push((coordinates, Solver::new(coordinates)));
+            self.solvers.len() - 1
+        })
+    }
+}
+
+/// One evaluation as it is made: the model and what was found in it.
+pub struct View<'a> {
+    /// Index of the flight time.
+    pub flight_time: usize,
+    /// Index of the variant.
+    pub variant: usize,
+    /// Plant of the evaluation.
+    pub plant: &'a Plant,
+    /// Model of the evaluation; zero where the draw failed.
+    pub model: &'a Model,
+    /// What was found.
+    pub evaluation: &'a Evaluation,
+}
+
+/// Evaluates the cases of one run.
+pub struct Evaluator<'a> {
+    definition: &'a Definition,
+    sampler: Sampler<'a>,
+    vehicle: &'a Vehicle,
+    /// Flight times, in the order of the definition.
+    pub times: Vec<AtTime>,
+    all_poles: bool,
+    workspaces: Mutex<Vec<Workspace>>,
+}
+
+impl<'a> Evaluator<'a> {
+    /// Prepares the evaluation of `definition` on `vehicle` with the draws of `dispersion`: plants,
+    /// nominal models, and the nominal pole of every mode of interest by continuation.
+    ///
+    /// With `all_poles`, records hold every pole, not only those of the modes of interest.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn new(
+        vehicle: &'a Vehicle,
+        dispersion: &'a Dispersion,
+        definition: &'a Definition,
+        all_poles: bool,
+    ) -> Result<Self, Error> {
+        let times = definition
+            .flight_times_s
+            .par_iter()
+            .map(|&time_s| at_time(vehicle, dispersion, definition, time_s))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Self {
+            definition,
+            sampler: Sampler::new(dispersion, definition.seed),
+            vehicle,
+            times,
+            all_poles,
+            workspaces: Mutex::new(Vec::new()),
+        })
+    }
+
+    /// The record of one case; a function of the population and the index alone.
+    pub fn evaluate(&self, population: usize, case: u64) -> Record {
+        self.visit(population, case, |_| ())
+    }
+
+    /// Like [`Evaluator::evaluate`], showing every evaluation with its model to `look`.
+    pub fn visit(&self, population: usize, case: u64, mut look: impl FnMut(&View<'_>)) -> Record {
+        let mut workspace = self.take();
+        let rule = &self.definition.populations[population];
+        self.sampler.draw(case, &rule.fixed, rule.drawn, &mut workspace.draws);
+        let mut evaluations = Vec::new();
+        for (flight_time, at) in self.times.iter().enumerate() {
+            let drawn = at.slots.draw(
+                self.vehicle,
+                self.sampler.parameters(),
+                &workspace.draws.effects,
+                &mut workspace.vehicle,
+            );
+            for variant in 0..at.variants.len() {
+                let plant = at.plant(variant);
+                let mut model = Model::zeros(plant.layout.coordinates());
+                let outcome =
+                    drawn.clone().and_then(|()| self.solve(at, variant, &mut model, &mut workspace));
+                let evaluation = Evaluation { variant, flight_time, outcome };
+                look(&View { flight_time, variant, plant, model: &model, evaluation: &evaluation });
+                evaluations.push(evaluation);
+            }
+        }
+        let record = Record {
+            population,
+            case,
+            values: workspace.draws.values.clone(),
+            scores: workspace.draws.scores.clone(),
+            evaluations,
+        };
+        self.workspaces.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
+        record
+    }
+
+    fn take(&self) -> Workspace {
+        let idle = self.workspaces.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        idle.unwrap_or_else(|| Workspace {
+            solvers: Vec::new(),
+            draws: Draws::default(),
+            vehicle: DrawnVehicle::default(),
+            poles: Vec::new(),
+        })
+    }
+
+    /// The poles of the vehicle drawn in `workspace`, with `model` filled.
+    fn solve(
+        &self,
+        at: &AtTime,
+        variant: usize,
+        model: &mut Model,
+        workspace: &mut Workspace,
+    ) -> Result<Vec<Pole>, Failure> {
+        let prepared = &at.variants[variant];
+        let plant = at.plant(variant);
+        plant.assemble(&workspace.vehicle, &prepared.effects, model);
+        let index = workspace.solver(model.coordinates());
+        let Workspace { solvers, poles, .. } = workspace;
+        let solver = &mut solvers[index].1;
+        solver.poles(model, poles).map_err(|error| failure_of(&error))?;
+        let mut scratch = Model::zeros(model.coordinates());
+        let mut rows = Vec::new();
+        for (mode, reference) in prepared.references.iter().enumerate() {
+            let identity = identify::identify(
+                solver,
+                reference,
+                &prepared.nominal,
+                model,
+                poles,
+                self.definition.exchange_ratio,
+                &mut scratch,
+            )
+            .map_err(|lost| self.lost(mode, lost))?;
+            let branches = [(Branch::Primary, Some(identity.primary)), (Branch::Partner, identity.partner)];
+            for (branch, found) in branches {
+                let Some(found) = found else { continue };
+                rows.push(named_pole(plant, mode, branch, &at.labels[mode], &found)?);
+            }
+        }
+        if self.all_poles {
+            let named: Vec<Complex<f64>> = rows.iter().map(|row| row.value).collect();
+            rows.extend(poles.iter().filter(|pole| !named.contains(pole)).map(|&value| Pole {
+                mode: None,
+                branch: Branch::Other,
+                label: None,
+                value,
+                identity_confidence: None,
+                participation_structure: None,
+                participation_nozzle: None,
+                residual: None,
+            }));
+        }
+        Ok(rows)
+    }
+
+    fn lost(&self, mode: usize, lost: identify::Lost) -> Failure {
+        match lost {
+            identify::Lost::Solve(error) => failure_of(&error),
+            identify::Lost::Overlap { .. } => Failure::new(
+                FailureKind::IdentityLost,
+                format!("mode {}: {lost}", self.definition.modes[mode]),
+            ),
+        }
+    }
+}
+
+/// The row of an identified pole.
+fn named_pole(
+    plant: &Plant,
+    mode: usize,
+    branch: Branch,
+    label: &str,
+    found: &modal::Candidate,
+) -> Result<Pole, Failure> {
+    let (pair, layout) = (&found.reference.pair, &plant.layout);
+    let bound = RESIDUAL_FACTOR * layout.coordinates() as f64 * f64::EPSILON;
+    if !(pair.residual <= bound) {
+        let message = format!("residual of pole {} is {:.2e}, allowed {bound:.2e}", pair.pole, pair.residual);
+        return Err(Failure::new(FailureKind::Residual, message));
+    }
+    Ok(Pole {
+        mode: Some(mode),
+        branch,
+        label: Some(label.to_owned()),
+        value: pair.pole,
+        identity_confidence: Some(found.overlap.norm()),
+        participation_structure: Some(found.reference.participation(layout.elastic())),
+        participation_nozzle: Some(found.reference.participation(layout.gimbals())),
+        residual: Some(pair.residual),
+    })
+}
+
+fn failure_of(error: &eigen::Error) -> Failure {
+    let kind = match error {
+        eigen::Error::NonFinite(_) => FailureKind::NonFinite,
+        eigen::Error::SingularMass { .. } => FailureKind::SingularMass,
+        eigen::Error::NoConvergence => FailureKind::NoConvergence,
+        eigen::Error::Trace { .. } => FailureKind::Residual,
+    };
+    Failure::new(kind, error.to_string())
+}
+
+/// Prepares one flight time.
+fn at_time(
+    vehicle: &Vehicle,
+    dispersion: &Dispersion,
+    definition: &Definition,
+    time_s: f64,
+) -> Result<AtTime, Error> {
+    let set = vehicle.modal.at(time_s).ok_or(Error::MissingTime(time_s))?;
+    let labels = definition
+        .modes
+        .iter()
+        .map(|mode| {
+            let named = vehicle.named_modes.iter().find(|named| named.name == *mode);
+            let label = named.and_then(|n| n.labels.iter().find(|l| set.mode(l).is_some()));
+            label.cloned().ok_or_else(|| Error::MissingMode { mode: mode.clone(), time_s })
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let mut slopes = Vec::new();
+    let mut plants = Vec::new();
+    for variant in &definition.variants {
+        if !slopes.contains(&variant.slope) {
+            slopes.push(variant.slope);
+            plants.push(super::plant::plant(vehicle, set, &definition.gimballed, variant.slope)?);
+        }
+    }
+    let parameters = dispersion.parameters();
+    let slots = Slots::new(vehicle, set, parameters);
+    let mut nominal = DrawnVehicle::default();
+    slots
+        .draw(vehicle, parameters, &vec![Affine::IDENTITY; parameters.count()], &mut nominal)
+        .map_err(|failure| Error::Nominal { time_s, failure })?;
+    let variants = definition
+        .variants
+        .iter()
+        .map(|variant| {
+            let plant = slopes.iter().position(|s| *s == variant.slope).unwrap_or_default();
+            at_variant(&plants[plant], plant, &nominal, variant, &labels).map_err(|(mode, lost)| {
+                Error::Lost {
+                    mode: definition.modes[mode].clone(),
+                    time_s,
+                    variant: variant.name.clone(),
+                    lost,
+                }
+            })
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(AtTime { flight_time_s: time_s, plants, slots, labels, variants })
+}
+
+/// Prepares one variant: nominal model and nominal poles; an error names the mode by index.
+fn at_variant(
+    plant: &Plant,
+    plant_index: usize,
+    nominal: &DrawnVehicle,
+    variant: &Variant,
+    labels: &[String],
+) -> Result<AtVariant, (usize, identify::Lost)> {
+    let effects = Effects {
+        thrust: if variant.thrust { 1.0 } else { 0.0 },
+        case_jet_damping: variant.case_jet_damping,
+        nozzle_jet_damping: variant.nozzle_jet_damping,
+        follower_thrust: variant.follower_thrust,
+    };
+    let size = plant.layout.coordinates();
+    let mut solver = Solver::new(size);
+    let mut references = Vec::new();
+    for (mode, label) in labels.iter().enumerate() {
+        let coordinate = plant.layout.position(label).expect("labels are taken from the mode set");
+        let model_at = |factor: f64, model: &mut Model| {
+            plant.assemble(nominal, &Effects { thrust: factor * effects.thrust, ..effects }, model);
+        };
+        let reference = identify::nominal(&mut solver, &plant.layout, coordinate, model_at)
+            .map_err(|lost| (mode, lost))?;
+        references.push(reference);
+    }
+    let mut model = Model::zeros(size);
+    plant.assemble(nominal, &effects, &mut model);
+    Ok(AtVariant { plant: plant_index, effects, nominal: model, references })
+}

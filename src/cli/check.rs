@@ -1,0 +1,37 @@
+//! `tvse check`: reads everything a run names and says what it found.
+
+use super::{Error, PASS};
+use crate::io;
+use crate::report::scenario;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Reads everything a run names and reports what it found, or every problem at once.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Example:
+  tvse check runs/reference.toml")]
+pub struct Args {
+    /// The run definition
+    run: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// All problems of the run file and of what it names.
+pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
+    let loaded = io::scenario::load(&args.run)?;
+    let corners: Vec<usize> = loaded.corners.iter().map(|c| c.population).collect();
+    write!(
+        out,
+        "{}",
+        scenario::overview(
+            &loaded.vehicle.vehicle,
+            &loaded.dispersion,
+            &loaded.definition,
+            &corners
+        )
+    )?;
+    Ok(PASS)
+}

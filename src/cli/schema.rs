@@ -1,0 +1,44 @@
+//! `tvse schema`: the JSON Schema of a TOML file.
+
+use super::{Error, PASS};
+use crate::scenario::schema::{FileKind, schema};
+use std::io::Write;
+
+/// The JSON Schema of a kind of TOML file, for editors and for reading.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Example:
+  tvse schema vehicle > vehicle.schema.json
+then, as the first line of vehicle.toml, for editors with a TOML language server:
+  #:schema ./vehicle.schema.json")]
+pub struct Args {
+    /// The kind of file
+    file: File,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum File {
+    /// A vehicle: engines, nozzles, actuators, motors
+    Vehicle,
+    /// A run definition
+    Run,
+    /// A dispersion table
+    Dispersion,
+    /// A stick model
+    Stick,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Output that cannot be written.
+pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
+    let schema = schema(match args.file {
+        File::Vehicle => FileKind::Vehicle,
+        File::Run => FileKind::Run,
+        File::Dispersion => FileKind::Dispersion,
+        File::Stick => FileKind::Stick,
+    });
+    writeln!(out, "{:#}", schema.as_value())?;
+    Ok(PASS)
+}

@@ -1,0 +1,140 @@
+//! A folder of files written aside, synced and renamed: it appears complete or not at all.
+//!
+//! Single files are the business of `files`; what they hold is that of the callers.
+
+#![expect(clippy::disallowed_methods, reason = "the place where the program touches the disk")]
+
+use super::files::{name, write_problem};
+use crate::problem::Problems;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Writes `files` (paths inside the folder, and bytes) as the folder `target`. The parent of
+/// `target` is made where it is missing. A folder that exists is refused, or replaced as a whole
+/// where `replace` names a file that it holds: so nothing but a folder of its kind is replaced.
+///
+/// # Errors
+/// One problem if the folder exists, or cannot be written; then nothing of it is left behind and
+/// an older folder stays.
+pub fn write(
+    target: &Path,
+    files: &[(PathBuf, Vec<u8>)],
+    replace: Option<&str>,
+) -> Result<(), Problems> {
+    let exists = fs::symlink_metadata(target).is_ok();
+    if exists && replace.is_none_or(|mark| !target.join(mark).is_file()) {
+        let (found, allowed) = match replace {
+            None => ("something that exists", "the name of a new folder, or --force".to_owned()),
+            Some(mark) => {
+                ("something that exists", format!("a new folder, or one that holds {mark}"))
+            }
+        };
+        return Err(Problems::input(name(target), "", found, allowed));
+    }
+    let parent = match target.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    fill(parent, target, files, exists).map_err(|e| write_problem(target, &e))
+}
+
+fn fill(
+    parent: &Path,
+    target: &Path,
+    files: &[(PathBuf, Vec<u8>)],
+    exists: bool,
+) -> io::Result<()> {
+    fs::create_dir_all(parent)?;
+    let aside = folder_aside(parent)?;
+    let mut folders = vec![aside.path().to_owned()];
+    for (path, bytes) in files {
+        let path = aside.path().join(path);
+        if let Some(folder) = path.parent().filter(|f| !folders.iter().any(|g| g == f)) {
+            fs::create_dir_all(folder)?;
+            folders.push(folder.to_owned());
+        }
+        let mut file = File::create_new(&path)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+    }
+    for folder in folders.iter().rev() {
+        sync(folder)?;
+    }
+    // A folder that is replaced steps aside first, and comes back if the new one cannot follow.
+    let old = if exists { Some(folder_aside(parent)?) } else { None };
+    if let Some(old) = &old {
+        fs::rename(target, old.path().join("old"))?;
+    }
+    let renamed = fs::rename(aside.path(), target);
+    if let (Err(_), Some(old)) = (&renamed, &old) {
+        fs::rename(old.path().join("old"), target)?;
+    }
+    renamed?;
+    // What was written aside now bears its final name and is not to be removed.
+    let _ = aside.keep();
+    sync(parent)
+}
+
+fn folder_aside(parent: &Path) -> io::Result<tempfile::TempDir> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".aside-");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o777));
+    }
+    builder.tempdir_in(parent)
+}
+
+/// Makes new names in a folder durable, where folders can be opened.
+fn sync(folder: &Path) -> io::Result<()> {
+    #[cfg(unix)]
+    File::open(folder)?.sync_all()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn files(text: &str) -> Vec<(PathBuf, Vec<u8>)> {
+        vec![("mark".into(), text.into()), ("tables/a".into(), b"table".to_vec())]
+    }
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect()
+    }
+
+    #[test]
+    fn a_folder_appears_with_all_its_files_and_nothing_beside_it() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("new/folder");
+        write(&target, &files("one"), None).unwrap();
+        assert_eq!(fs::read(target.join("tables/a")).unwrap(), b"table");
+        assert_eq!(names(&place.path().join("new")), ["folder"]);
+    }
+
+    #[test]
+    fn a_folder_that_exists_is_refused_and_replaced_only_where_it_holds_the_mark() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("folder");
+        write(&target, &files("one"), None).unwrap();
+        assert!(write(&target, &files("two"), None).unwrap_err().to_string().contains("--force"));
+        write(&target, &files("two"), Some("mark")).unwrap();
+        assert_eq!(fs::read(target.join("mark")).unwrap(), b"two");
+        assert!(write(&target, &files("three"), Some("other")).is_err());
+        assert_eq!(fs::read(target.join("mark")).unwrap(), b"two");
+        assert_eq!(names(place.path()), ["folder"]);
+    }
+
+    #[test]
+    fn a_place_that_is_no_folder_is_a_problem_that_names_the_target() {
+        let place = tempfile::tempdir().unwrap();
+        fs::write(place.path().join("file"), "").unwrap();
+        let target = place.path().join("file/folder");
+        let problems = write(&target, &files("one"), None).unwrap_err();
+        assert!(problems.to_string().contains("file/folder"), "{problems}");
+    }
+}

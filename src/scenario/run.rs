@@ -1,0 +1,259 @@
+//! The run: from the run file to a validated definition, given its vehicle and dispersion.
+//!
+//! Types and ranges of single values are checked before, by `table`.
+
+use super::run_file::{CornerFile, NozzleJetFile, RunFile, SignsFile, SlopeFile, VariantFile};
+use super::table::Findings;
+use super::vehicle::Resolved;
+use super::{names, pattern};
+use crate::campaign::{Definition, NozzleJet, Population, Slope, Variant};
+use crate::dispersion::Dispersion;
+use crate::problem::Problems;
+use crate::spelling::allowed_instead;
+
+/// An adverse corner whose signs the campaign has to evaluate before its populations are run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Corner {
+    /// Index of the fixed case among the populations; the Monte Carlo around it, if any, follows.
+    pub population: usize,
+    /// Name, for messages.
+    pub name: String,
+    /// Index of the mode whose damping is made least.
+    pub mode: usize,
+    /// Index of the variant in which it is made least.
+    pub variant: usize,
+}
+
+/// A validated run: its definition, and the corners whose signs are still to be evaluated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// The definition; populations of the corners below have no fixed values yet.
+    pub definition: Definition,
+    /// Corners with evaluated signs.
+    pub corners: Vec<Corner>,
+}
+
+/// Populations that every run has.
+const STANDARD: [&str; 2] = ["nominal", "dispersed"];
+
+/// Checks what the values of `file` mean together and with its vehicle and dispersion. Without
+/// those (where they could not be read, which `findings` knows) the rest is still checked.
+///
+/// # Errors
+/// All problems of the file.
+pub fn resolve(
+    file: &RunFile,
+    name: &str,
+    vehicle: Option<&Resolved>,
+    dispersion: Option<&Dispersion>,
+    mut findings: Findings,
+) -> Result<Run, Problems> {
+    let f = &mut findings;
+    let variants: Vec<Variant> = file.variant.iter().map(variant).collect();
+    for (i, variant) in variants.iter().enumerate() {
+        names::word(f, &format!("variant[{i}].name"), &variant.name);
+    }
+    names::unique(f, "variant", variants.iter().map(|v| v.name.as_str()));
+    let flight_times_s = flight_times(file, vehicle, f);
+    modes(file, vehicle, &flight_times_s, f);
+    let gimballed = gimballed(file, vehicle, f);
+
+    let standard = |name: &str, cases, drawn| Population {
+        name: name.into(),
+        cases,
+        fixed: Vec::new(),
+        drawn,
+    };
+    let mut populations =
+        vec![standard(STANDARD[0], 1, false), standard(STANDARD[1], file.cases, true)];
+    let mut corners = Vec::new();
+    for (i, corner) in file.corner.iter().enumerate() {
+        let key = format!("corner[{i}]");
+        names::word(f, &format!("{key}.name"), &corner.name);
+        if populations.iter().any(|p| p.name == corner.name || p.name == around(&corner.name)) {
+            let found = format!("\"{}\"", corner.name);
+            f.push(format!("{key}.name"), found, "a name that no other population has");
+        }
+        let fixed = match corner.signs {
+            SignsFile::Given => given(corner, &key, dispersion, f),
+            SignsFile::Evaluated => {
+                corners.extend(evaluated(file, corner, &key, populations.len(), f));
+                Vec::new()
+            }
+        };
+        let fixed_case = Population { name: corner.name.clone(), cases: 1, fixed, drawn: false };
+        if corner.cases > 0 {
+            let name = around(&corner.name);
+            let cloud = Population { name, cases: corner.cases, drawn: true, ..fixed_case.clone() };
+            populations.extend([fixed_case, cloud]);
+        } else {
+            populations.push(fixed_case);
+        }
+    }
+    findings.finish(Some(Run {
+        definition: Definition {
+            name: name.into(),
+            seed: file.seed,
+            populations,
+            flight_times_s,
+            variants,
+            modes: file.modes.clone(),
+            gimballed,
+            exchange_ratio: file.identity.exchange_ratio,
+        },
+        corners,
+    }))
+}
+
+/// Name of the Monte Carlo population around a corner.
+fn around(corner: &str) -> String {
+    format!("{corner}_dispersed")
+}
+
+fn variant(file: &VariantFile) -> Variant {
+    Variant {
+        name: file.name.clone(),
+        thrust: file.thrust,
+        case_jet_damping: file.case_jet_damping,
+        nozzle_jet_damping: match file.nozzle_jet_damping {
+            NozzleJetFile::Off => NozzleJet::Off,
+            NozzleJetFile::Equation13 => NozzleJet::Linear,
+            NozzleJetFile::RigidNozzle => NozzleJet::RigidNozzle,
+        },
+        follower_thrust: file.follower_thrust,
+        slope: match file.slope {
+            SlopeFile::VirtualGrid => Slope::VirtualGrid,
+            SlopeFile::SingleGrid => Slope::SingleGrid,
+        },
+    }
+}
+
+fn flight_times(file: &RunFile, vehicle: Option<&Resolved>, f: &mut Findings) -> Vec<f64> {
+    let known = vehicle.map(|v| v.flight_times_s.as_slice());
+    let Some(times) = &file.flight_times_s else { return known.unwrap_or_default().to_vec() };
+    names::ascending(f, "flight_times_s", times);
+    if let Some(known) = known {
+        for (i, time) in times.iter().enumerate().filter(|(_, t)| !known.contains(t)) {
+            let allowed = format!("a flight time of the vehicle, one of {known:?} s");
+            f.push(format!("flight_times_s[{i}]"), format!("{time} s"), allowed);
+        }
+    }
+    times.clone()
+}
+
+/// Every mode of interest is named by the vehicle and has a label at every flight time.
+fn modes(file: &RunFile, vehicle: Option<&Resolved>, times: &[f64], f: &mut Findings) {
+    let Some(vehicle) = vehicle.map(|v| &v.vehicle) else { return };
+    for (i, name) in file.modes.iter().enumerate() {
+        let key = format!("modes[{i}]");
+        if file.modes[..i].contains(name) {
+            f.push(&key, format!("\"{name}\" again"), "each mode once");
+        }
+        let Some(mode) = vehicle.named_modes.iter().find(|m| m.name == *name) else {
+            let known = vehicle.named_modes.iter().map(|m| m.name.as_str());
+            f.push(&key, format!("\"{name}\""), allowed_instead(name, known));
+            continue;
+        };
+        let sets = times.iter().filter_map(|t| vehicle.modal.at(*t));
+        for set in sets.filter(|set| mode.labels.iter().all(|label| set.mode(label).is_none())) {
+            let found = format!("\"{name}\", without a label at {} s", set.flight_time_s);
+            let allowed =
+                "a mode with a label of the modal package at every flight time of the run";
+            f.push(&key, found, allowed);
+        }
+    }
+}
+
+fn gimballed(file: &RunFile, vehicle: Option<&Resolved>, f: &mut Findings) -> Vec<bool> {
+    let Some(vehicle) = vehicle.map(|v| &v.vehicle) else { return Vec::new() };
+    let paths: Vec<String> = vehicle.engines.iter().map(|e| e.path()).collect();
+    for (i, entry) in file.gimballed.iter().enumerate() {
+        if !paths.iter().any(|path| pattern::matches(entry, path)) {
+            let allowed = allowed_instead(entry, paths.iter().map(String::as_str));
+            f.push(
+                format!("gimballed[{i}]"),
+                format!("\"{entry}\", which matches no engine"),
+                allowed,
+            );
+        }
+    }
+    let chosen = |path: &String| file.gimballed.iter().any(|entry| pattern::matches(entry, path));
+    paths.iter().map(chosen).collect()
+}
+
+/// Fixed values of a corner whose signs the file gives, in the order of the draw keys.
+fn given(
+    corner: &CornerFile,
+    key: &str,
+    dispersion: Option<&Dispersion>,
+    f: &mut Findings,
+) -> Vec<(usize, f64)> {
+    for (name, value) in [("mode", &corner.mode), ("variant", &corner.variant)] {
+        if let Some(value) = value {
+            let allowed = "nothing, or signs = \"evaluated\"";
+            f.push(format!("{key}.{name}"), format!("\"{value}\""), allowed);
+        }
+    }
+    if corner.low.is_empty() && corner.high.is_empty() {
+        f.push(key, "neither `low` nor `high`", "at least one entry in `low` or `high`");
+    }
+    let Some(dispersion) = dispersion else { return Vec::new() };
+    let mut sides: Vec<Option<usize>> = vec![None; dispersion.draws().len()];
+    for (side, (list, entries)) in [("low", &corner.low), ("high", &corner.high)].iter().enumerate()
+    {
+        for (i, entry) in entries.iter().enumerate() {
+            let place = format!("{key}.{list}[{i}]");
+            let mut matched = false;
+            for (draw, chosen) in dispersion.draws().iter().zip(&mut sides) {
+                let path = draw.key.split(" @ ").next().unwrap_or(&draw.key);
+                if draw.worst.is_none() || !(draw.key == *entry || pattern::matches(entry, path)) {
+                    continue;
+                }
+                matched = true;
+                if chosen.is_some_and(|other| other != side) {
+                    let found = format!("\"{}\", which is in `low` as well", draw.key);
+                    f.push(&place, found, "each key on one side");
+                }
+                *chosen = Some(side);
+            }
+            if !matched {
+                let known = dispersion.draws().iter().filter(|d| d.worst.is_some());
+                let allowed = allowed_instead(entry, known.map(|d| d.key.as_str()));
+                let found = format!("\"{entry}\", which matches no draw key with `worst` values");
+                f.push(&place, found, allowed);
+            }
+        }
+    }
+    let values = dispersion.draws().iter().zip(sides).enumerate();
+    values.filter_map(|(i, (draw, side))| Some((i, draw.worst?[side?]))).collect()
+}
+
+/// A corner whose signs are evaluated.
+fn evaluated(
+    file: &RunFile,
+    corner: &CornerFile,
+    key: &str,
+    population: usize,
+    f: &mut Findings,
+) -> Option<Corner> {
+    for (list, entries) in [("low", &corner.low), ("high", &corner.high)] {
+        if !entries.is_empty() {
+            let found = format!("{} entries", entries.len());
+            f.push(format!("{key}.{list}"), found, "nothing, or signs = \"given\"");
+        }
+    }
+    let mut index = |name: &str, value: &Option<String>, known: Vec<&str>| {
+        let found = value.as_deref().map_or("nothing".into(), |v| format!("\"{v}\""));
+        let at = known.iter().position(|k| Some(*k) == value.as_deref());
+        if at.is_none() {
+            let allowed = allowed_instead(value.as_deref().unwrap_or(""), known);
+            f.push(format!("{key}.{name}"), found, allowed);
+        }
+        at
+    };
+    let modes = file.modes.iter().map(String::as_str).collect();
+    let mode = index("mode", &corner.mode, modes);
+    let variants = file.variant.iter().map(|v| v.name.as_str()).collect();
+    let variant = index("variant", &corner.variant, variants);
+    Some(Corner { population, name: corner.name.clone(), mode: mode?, variant: variant? })
+}

@@ -1,0 +1,145 @@
+//! The run definition as it is written, before any check of what its values mean together.
+//!
+//! Types and ranges of single values live here; the rest is checked in `run`.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// A campaign: which vehicle and dispersion, how many cases, evaluated where and how.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "tvse run definition")]
+pub struct RunFile {
+    /// The vehicle: its folder or its file, relative to this file.
+    pub vehicle: String,
+    /// The dispersion table, relative to this file.
+    pub dispersion: String,
+    /// Gates that `tvse gate` applies unless given others, relative to this file.
+    pub gates: Option<String>,
+    /// Number of dispersed cases.
+    #[schemars(range(min = 1))]
+    pub cases: u64,
+    /// Seed of every draw.
+    pub seed: u64,
+    /// Flight times, s, ascending (default: all of the vehicle).
+    #[schemars(length(min = 1))]
+    pub flight_times_s: Option<Vec<f64>>,
+    /// Named modes of interest.
+    #[schemars(length(min = 1))]
+    pub modes: Vec<String>,
+    /// Engines that are gimballed, by path or with `*`; the others are locked.
+    #[serde(default = "every_engine")]
+    pub gimballed: Vec<String>,
+    /// How poles are followed from the nominal to a case.
+    #[serde(default)]
+    pub identity: IdentityFile,
+    /// Ways to evaluate each draw.
+    #[schemars(length(min = 1))]
+    pub variant: Vec<VariantFile>,
+    /// Adverse corners: fixed cases with Monte Carlo around them.
+    #[serde(default)]
+    pub corner: Vec<CornerFile>,
+}
+
+fn every_engine() -> Vec<String> {
+    vec!["*.*".into()]
+}
+
+/// How poles are followed from the nominal to a case.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IdentityFile {
+    /// Second-best over best overlap above which a case is followed by homotopy and both poles
+    /// are stored.
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1.0))]
+    pub exchange_ratio: f64,
+}
+
+impl Default for IdentityFile {
+    fn default() -> Self {
+        Self { exchange_ratio: 0.5 }
+    }
+}
+
+/// One way to evaluate a draw.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VariantFile {
+    /// Name, a–z, 0–9 and _.
+    pub name: String,
+    /// Thrust; off sets thrust, acceleration and mass flow to zero.
+    #[serde(default = "yes")]
+    pub thrust: bool,
+    /// Jet damping of the case.
+    pub case_jet_damping: bool,
+    /// Jet damping of the nozzle.
+    pub nozzle_jet_damping: NozzleJetFile,
+    /// Thrust that follows elastic rotation; only for modes with axial-load stiffening.
+    #[serde(default)]
+    pub follower_thrust: bool,
+    /// Gimbal slope.
+    #[serde(default)]
+    pub slope: SlopeFile,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// Jet damping of the nozzle.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum NozzleJetFile {
+    /// None.
+    Off,
+    /// Equation (13), linear in the nozzle length.
+    #[serde(rename = "equation-13")]
+    Equation13,
+    /// Exact for a rigid nozzle with straight flow.
+    RigidNozzle,
+}
+
+/// Gimbal slope.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(inline)]
+pub enum SlopeFile {
+    /// Improved Virtual Grid, equations (15) to (22).
+    #[default]
+    VirtualGrid,
+    /// Rotation of the gimbal grid alone.
+    SingleGrid,
+}
+
+/// An adverse corner: draw keys at their `worst` values, and Monte Carlo around it.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CornerFile {
+    /// Name, a–z, 0–9 and _.
+    pub name: String,
+    /// Number of cases around it: keys without `worst` values are drawn.
+    #[serde(default)]
+    pub cases: u64,
+    /// Who chooses between the low and the high `worst` value of each key.
+    pub signs: SignsFile,
+    /// With signs = "given": keys at their low value, by parameter path, with `*`, or whole key.
+    #[serde(default)]
+    pub low: Vec<String>,
+    /// With signs = "given": keys at their high value.
+    #[serde(default)]
+    pub high: Vec<String>,
+    /// With signs = "evaluated": the mode whose damping is made least.
+    pub mode: Option<String>,
+    /// With signs = "evaluated": the variant in which it is made least.
+    pub variant: Option<String>,
+}
+
+/// Who chooses between low and high.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SignsFile {
+    /// The lists `low` and `high`.
+    Given,
+    /// The program: the value of each key that lowers the damping of `mode` in `variant`.
+    Evaluated,
+}

@@ -1,0 +1,212 @@
+//! The vehicle file as it is written, before any check of what its values mean together.
+//!
+//! Types and ranges of single values live here; the rest is checked in `vehicle`.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// A vehicle: engines, nozzles, actuators, motors, and the modal package of its body.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "tvse vehicle")]
+pub struct VehicleFile {
+    /// Name shown wherever results are shown.
+    pub name: String,
+    /// Folder of the modal package, relative to this file.
+    pub modal_package: String,
+    /// Flight times at which the vehicle can be evaluated, s, ascending; the modal package holds
+    /// modes at each of them.
+    #[schemars(length(min = 1))]
+    pub flight_times_s: Vec<f64>,
+    /// The elastic structure.
+    pub structure: StructureFile,
+    /// Modes of interest by name.
+    #[serde(default)]
+    pub named_mode: Vec<NamedModeFile>,
+    /// Motors, to which engines refer by name.
+    #[schemars(length(min = 1))]
+    pub motor: Vec<MotorFile>,
+    /// Engines.
+    #[schemars(length(min = 1))]
+    pub engine: Vec<EngineFile>,
+}
+
+/// The elastic structure.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StructureFile {
+    /// Damping ratio of every mode.
+    #[schemars(range(min = 0.0), extend("exclusiveMaximum" = 1.0))]
+    pub damping_ratio: f64,
+    /// Flight time whose nominal frequency decides in which frequency band a mode is dispersed, s.
+    pub band_time_s: f64,
+}
+
+/// A mode of interest by name.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NamedModeFile {
+    /// Name.
+    pub name: String,
+    /// Labels of the modal package that carry the name; at a flight time the first one present
+    /// counts.
+    #[schemars(length(min = 1))]
+    pub labels: Vec<String>,
+}
+
+/// Thrust and mass flow of a motor in time, linear between the entries.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotorFile {
+    /// Name.
+    pub name: String,
+    /// Vacuum specific impulse, s.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub specific_impulse_s: f64,
+    /// Flight times of the tables, s, ascending.
+    #[schemars(length(min = 1))]
+    pub time_s: Vec<f64>,
+    /// Thrust at each time, N.
+    pub thrust_n: Vec<f64>,
+    /// Mass flow at each time, kg/s.
+    pub mass_flow_kg_s: Vec<f64>,
+    /// Burned fraction of the propellant at each time, 0 to 1; needed where a nozzle ablates.
+    pub burned_fraction: Option<Vec<f64>>,
+}
+
+/// An engine: a vectored nozzle on its gimbal.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EngineFile {
+    /// Group, the first segment of its parameter paths.
+    pub group: String,
+    /// Name inside the group, the second segment.
+    pub name: String,
+    /// Name of its motor.
+    pub motor: String,
+    /// Grid of the gimbal point.
+    pub gimbal_grid: String,
+    /// Unit vector of the thrust force on the vehicle.
+    pub thrust_direction: [f64; 3],
+    /// The two gimbal axes, orthonormal and normal to the thrust; actuator n drives axis n. Left
+    /// out, they are made from the moments of the actuators' action lines about the gimbal.
+    pub axes: Option<[[f64; 3]; 2]>,
+    /// Case centreline grids from the head end to the throat, by name or with `*`; those that
+    /// match a `*` are taken along the flow, as far as the throat.
+    #[serde(default)]
+    pub case_stations: Vec<String>,
+    /// Grid of the throat, the last case station (default: the gimbal).
+    pub throat_grid: Option<String>,
+    /// The moving part.
+    pub nozzle: NozzleFile,
+    /// Flex bearing.
+    pub bearing: Option<BearingFile>,
+    /// The two actuators.
+    pub actuator: [ActuatorFile; 2],
+}
+
+/// The moving part of an engine, rotationally symmetric about its axis.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NozzleFile {
+    /// Moving mass, unablated, kg.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub mass_kg: f64,
+    /// Distance of the cg from the pivot along the exhaust, m (negative: forward of the pivot).
+    pub cg_m: f64,
+    /// Transverse inertia about the pivot, unablated, kg·m².
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub inertia_kg_m2: f64,
+    /// Inertia about the nozzle's own axis, kg·m².
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub axial_inertia_kg_m2: f64,
+    /// Length from the pivot to the exit plane, m.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub length_m: f64,
+    /// Ablation of the liner.
+    pub ablation: Option<AblationFile>,
+}
+
+/// Ablation of the liner: what is lost at unit factor when all propellant is burned.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AblationFile {
+    /// Ablation factor.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0.0))]
+    pub factor: f64,
+    /// Mass lost, kg.
+    #[schemars(range(min = 0.0))]
+    pub mass_loss_kg: f64,
+    /// Transverse inertia about the pivot lost, kg·m².
+    #[schemars(range(min = 0.0))]
+    pub inertia_loss_kg_m2: f64,
+    /// Change of the cg distance from the pivot, m (negative: towards the pivot).
+    pub cg_change_m: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// Flex bearing.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BearingFile {
+    /// Stiffness, N·m/rad.
+    #[schemars(range(min = 0.0))]
+    pub stiffness_n_m_rad: f64,
+    /// Damping, N·m·s/rad.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub damping_n_m_s_rad: f64,
+}
+
+/// An actuator of one gimbal axis.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ActuatorFile {
+    /// Name inside its engine, the third segment of its parameter paths.
+    pub name: String,
+    /// Grid of the backup structure to which it is attached.
+    pub attach_grid: String,
+    /// Attach point from the gimbal, m (default: from the positions of the two grids).
+    pub attach_m: Option<[f64; 3]>,
+    /// Unit vector of the action line.
+    pub action_line: [f64; 3],
+    /// Torque law.
+    pub kind: ActuatorKind,
+    /// Stiffness at the reference inertia, N·m/rad; either this or `frequency_hz`.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub stiffness_n_m_rad: Option<f64>,
+    /// Natural frequency at the reference inertia, Hz; either this or `stiffness_n_m_rad`.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub frequency_hz: Option<f64>,
+    /// Closed-loop damping ratio at the reference inertia, the nominal unablated one about the
+    /// pivot.
+    #[schemars(range(min = 0.0))]
+    pub damping_ratio: f64,
+    /// Whether the flex bearing is part of the actuator's stiffness.
+    #[serde(default)]
+    pub bearing: BearingPart,
+}
+
+/// Torque law of an actuator.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ActuatorKind {
+    /// Spring and damper between command and nozzle.
+    SecondOrder,
+}
+
+/// Whether the flex bearing is part of an actuator's stiffness.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(inline)]
+pub enum BearingPart {
+    /// Inside the actuator's stiffness, not added.
+    #[default]
+    Included,
+    /// Acts on the gimbal rotation besides the actuator.
+    Separate,
+}

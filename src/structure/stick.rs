@@ -1,0 +1,635 @@
+//! A validated stick model: beams, masses and springs whose values are allowed.
+//!
+//! It holds the nominal description over all flight times; matrices are made in `weigh`.
+
+use super::raw;
+use crate::problem::{Kind, Problems};
+use crate::vehicle::motor::interpolate;
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+
+/// Most elements of a model; beyond it the dense solution would take minutes and gigabytes.
+pub const MAX_ELEMENTS: usize = 1000;
+
+/// A validated stick model.
+#[derive(Debug, Clone)]
+pub struct Stick {
+    /// Name of the model.
+    pub name: String,
+    /// Flight times at which modes are made by default, s, increasing.
+    pub flight_times_s: Vec<f64>,
+    /// Whether the slosh shares stay in the body.
+    pub slosh_in_body: bool,
+    /// Nodes with six degrees of freedom each.
+    pub nodes: Vec<Node>,
+    /// Beam elements.
+    pub elements: Vec<Element>,
+    /// Masses spread along elements.
+    pub line_masses: Vec<LineMass>,
+    /// Point masses.
+    pub point_masses: Vec<PointMass>,
+    /// Springs.
+    pub springs: Vec<Spring>,
+    /// Massless grids.
+    pub points: Vec<Point>,
+}
+
+/// A node: a named point with three translations and three rotations.
+#[derive(Debug, Clone)]
+pub struct Node {
+    /// Name of its grid.
+    pub name: String,
+    /// Position, m.
+    pub position_m: Vector3<f64>,
+}
+
+/// A beam element between two nodes.
+#[derive(Debug, Clone)]
+pub struct Element {
+    /// Nodes at its start and end.
+    pub nodes: [usize; 2],
+    /// Stations of its start and end on its beam, m.
+    pub stations_m: [f64; 2],
+    /// Local axes as rows: along the beam, local y, local z.
+    pub axes: Matrix3<f64>,
+    /// Cross section at its start and end.
+    pub sections: [Section; 2],
+    /// Young's modulus, Pa.
+    pub youngs_modulus_pa: f64,
+    /// Shear modulus, Pa.
+    pub shear_modulus_pa: f64,
+}
+
+/// A cross section.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Section {
+    /// A circular tube.
+    Tube {
+        /// Mean radius, m.
+        radius_m: f64,
+        /// Wall thickness, m.
+        thickness_m: f64,
+    },
+    /// Any section by its properties.
+    General(Properties),
+}
+
+/// Properties of a cross section.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Properties {
+    /// Area, m².
+    pub area_m2: f64,
+    /// Second moment of area about local y, m⁴.
+    pub inertia_y_m4: f64,
+    /// Second moment of area about local z, m⁴.
+    pub inertia_z_m4: f64,
+    /// Torsion constant, m⁴.
+    pub torsion_m4: f64,
+}
+
+impl Section {
+    /// Properties a fraction `w` of the way from `self` to `end`: linear in radius and thickness
+    /// for two tubes, in the properties otherwise.
+    pub fn toward(&self, end: &Section, w: f64) -> Properties {
+        let mix = |a: f64, b: f64| a + w * (b - a);
+        match (self, end) {
+            (
+                Section::Tube { radius_m: r0, thickness_m: t0 },
+                Section::Tube { radius_m: r1, thickness_m: t1 },
+            ) => tube(mix(*r0, *r1), mix(*t0, *t1)),
+            _ => {
+                let (a, b) = (self.properties(), end.properties());
+                Properties {
+                    area_m2: mix(a.area_m2, b.area_m2),
+                    inertia_y_m4: mix(a.inertia_y_m4, b.inertia_y_m4),
+                    inertia_z_m4: mix(a.inertia_z_m4, b.inertia_z_m4),
+                    torsion_m4: mix(a.torsion_m4, b.torsion_m4),
+                }
+            }
+        }
+    }
+
+    fn properties(&self) -> Properties {
+        match *self {
+            Section::Tube { radius_m, thickness_m } => tube(radius_m, thickness_m),
+            Section::General(properties) => properties,
+        }
+    }
+}
+
+/// Exact properties of an annulus of mean radius r and thickness t:
+/// A = 2πrt, I = πrt(r² + t²/4), J = 2I.
+fn tube(r: f64, t: f64) -> Properties {
+    use std::f64::consts::PI;
+    let inertia = PI * r * t * (r * r + t * t / 4.0);
+    Properties {
+        area_m2: 2.0 * PI * r * t,
+        inertia_y_m4: inertia,
+        inertia_z_m4: inertia,
+        torsion_m4: 2.0 * inertia,
+    }
+}
+
+/// A value in flight time: constant, or linear between the entries of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct History {
+    time_s: Vec<f64>,
+    value: Vec<f64>,
+}
+
+impl History {
+    /// The value at `time_s`; `None` outside the table.
+    pub fn at(&self, time_s: f64) -> Option<f64> {
+        match (self.time_s.first(), self.time_s.last()) {
+            (Some(&first), Some(&last)) => (first <= time_s && time_s <= last)
+                .then(|| interpolate(&self.time_s, &self.value, time_s)),
+            _ => self.value.first().copied(),
+        }
+    }
+}
+
+/// A mass spread along the elements of one beam.
+#[derive(Debug, Clone)]
+pub struct LineMass {
+    /// Name.
+    pub name: String,
+    /// Elements of its beam, as a range of `Stick::elements`.
+    pub elements: std::ops::Range<usize>,
+    /// Stations between which it lies, m.
+    pub stations_m: [f64; 2],
+    /// Mass in time, kg.
+    pub mass_kg: History,
+    /// Mass that fills the whole range, kg, for a settled liquid.
+    pub full_kg: Option<f64>,
+    /// Whether it moves axially with the beam.
+    pub axial: bool,
+    /// Whether it turns with the beam.
+    pub torsion: bool,
+    /// Radius of gyration about the axis, m; that of the section if `None`.
+    pub gyration_m: Option<f64>,
+    /// Sloshing part, kg.
+    pub slosh_kg: f64,
+}
+
+/// A point mass on a rigid link.
+#[derive(Debug, Clone)]
+pub struct PointMass {
+    /// Name of its grid.
+    pub name: String,
+    /// Node to which it is attached.
+    pub node: usize,
+    /// Position, m.
+    pub position_m: Vector3<f64>,
+    /// Mass in time, kg.
+    pub mass_kg: History,
+    /// Principal inertias about x, y, z, kg·m².
+    pub inertia_kg_m2: Vector3<f64>,
+}
+
+/// A spring at a point between two nodes on rigid links.
+#[derive(Debug, Clone)]
+pub struct Spring {
+    /// Nodes.
+    pub nodes: [usize; 2],
+    /// Point where it acts, m.
+    pub position_m: Vector3<f64>,
+    /// Stiffnesses along x, y, z, N/m.
+    pub translation_n_m: Vector3<f64>,
+    /// Stiffnesses about x, y, z, N·m/rad.
+    pub rotation_n_m_rad: Vector3<f64>,
+}
+
+/// A massless grid on a rigid link.
+#[derive(Debug, Clone)]
+pub struct Point {
+    /// Name of the grid.
+    pub name: String,
+    /// Node to which it is attached.
+    pub node: usize,
+    /// Position, m.
+    pub position_m: Vector3<f64>,
+}
+
+impl Stick {
+    /// Reads and checks the text of a stick model; `file` is how the user named it.
+    ///
+    /// # Errors
+    /// Every problem of the text at once; if it is no TOML of the right types, the first of those.
+    pub fn parse(text: &str, file: &str) -> Result<Self, Problems> {
+        let raw: raw::Stick = toml::from_str(text).map_err(|e| {
+            let line = e.span().map_or(String::new(), |s| {
+                format!("line {}", 1 + text[..s.start].matches('\n').count())
+            });
+            Problems::input(file, line, e.message().trim(), "see `tvse schema stick`")
+        })?;
+        Reading { file, problems: Problems::default(), nodes: BTreeMap::new() }.stick(raw)
+    }
+}
+
+/// A reading in progress: the problems so far and the nodes by name.
+struct Reading<'a> {
+    file: &'a str,
+    problems: Problems,
+    nodes: BTreeMap<String, usize>,
+}
+
+impl Reading<'_> {
+    fn refuse(&mut self, key: impl Into<String>, found: impl Into<String>, allowed: &str) {
+        self.problems.push(Kind::Input, self.file, key, found, allowed);
+    }
+
+    fn finite(&mut self, key: impl Into<String>, value: f64) {
+        if !value.is_finite() {
+            self.refuse(key, value.to_string(), "a finite number");
+        }
+    }
+
+    fn positive(&mut self, key: impl Into<String>, value: f64) {
+        if !(value > 0.0 && value.is_finite()) {
+            self.refuse(key, value.to_string(), "a finite number above 0");
+        }
+    }
+
+    fn not_negative(&mut self, key: impl Into<String>, value: f64) {
+        if !(value >= 0.0 && value.is_finite()) {
+            self.refuse(key, value.to_string(), "a finite number, 0 or above");
+        }
+    }
+
+    fn vector(&mut self, key: &str, value: [f64; 3]) -> Vector3<f64> {
+        for v in value {
+            self.finite(key, v);
+        }
+        Vector3::from(value)
+    }
+
+    fn increasing(&mut self, key: &str, values: &[f64]) {
+        if !values.iter().all(|v| v.is_finite()) || !values.windows(2).all(|w| w[0] < w[1]) {
+            self.refuse(key, format!("{values:?}"), "finite, strictly increasing times");
+        }
+    }
+
+    fn history(&mut self, key: &str, time_s: Vec<f64>, value: Vec<f64>) -> History {
+        self.increasing(&format!("{key}.time_s"), &time_s);
+        if value.len() != time_s.len().max(1) {
+            self.refuse(
+                format!("{key}.mass_kg"),
+                format!("{} values", value.len()),
+                "one value, or one for each of time_s",
+            );
+        }
+        for &v in &value {
+            self.not_negative(format!("{key}.mass_kg"), v);
+        }
+        History { time_s, value }
+    }
+
+    fn node(&mut self, key: &str, name: &str) -> usize {
+        self.nodes.get(name).copied().unwrap_or_else(|| {
+            self.refuse(key, format!("`{name}`"), "the name of a beam grid");
+            0
+        })
+    }
+
+    fn section(&mut self, key: &str, raw: &raw::Section) -> Section {
+        let mut read = |name: &str, value: Option<f64>| {
+            let value = value.unwrap_or_default();
+            self.positive(format!("{key}.{name}"), value);
+            value
+        };
+        match raw {
+            raw::Section {
+                radius_m,
+                thickness_m,
+                area_m2: None,
+                inertia_y_m4: None,
+                inertia_z_m4: None,
+                torsion_m4: None,
+            } => {
+                let radius_m = read("radius_m", *radius_m);
+                let thickness_m = read("thickness_m", *thickness_m);
+                if !(thickness_m <= 2.0 * radius_m) {
+                    self.refuse(
+                        format!("{key}.thickness_m"),
+                        thickness_m.to_string(),
+                        "at most twice the mean radius",
+                    );
+                }
+                Section::Tube { radius_m, thickness_m }
+            }
+            raw::Section { radius_m: None, thickness_m: None, .. } => {
+                Section::General(Properties {
+                    area_m2: read("area_m2", raw.area_m2),
+                    inertia_y_m4: read("inertia_y_m4", raw.inertia_y_m4),
+                    inertia_z_m4: read("inertia_z_m4", raw.inertia_z_m4),
+                    torsion_m4: read("torsion_m4", raw.torsion_m4),
+                })
+            }
+            _ => {
+                self.refuse(
+                    key,
+                    "a mixture of both forms",
+                    "either radius_m and thickness_m, or area_m2, inertia_y_m4, inertia_z_m4 and \
+                     torsion_m4",
+                );
+                Section::Tube { radius_m: 1.0, thickness_m: 1.0 }
+            }
+        }
+    }
+
+    fn stick(mut self, raw: raw::Stick) -> Result<Stick, Problems> {
+        if raw.format != 1 {
+            self.refuse("format", raw.format.to_string(), "1");
+        }
+        if raw.name.trim().is_empty() {
+            self.refuse("name", "an empty text", "a name");
+        }
+        if raw.flight_times_s.is_empty() {
+            self.refuse("flight_times_s", "no time", "at least one time");
+        }
+        self.increasing("flight_times_s", &raw.flight_times_s);
+        let elements: usize =
+            raw.beam.iter().flat_map(|b| &b.piece).fold(0, |n, p| n.saturating_add(p.elements));
+        if raw.beam.is_empty() || elements > MAX_ELEMENTS {
+            self.refuse(
+                "beam",
+                format!("{} beams with {elements} elements", raw.beam.len()),
+                "at least one beam, at most 1000 elements in all",
+            );
+            return Err(self.problems);
+        }
+        let materials = self.materials(&raw.material);
+        let mut stick = Stick {
+            name: raw.name,
+            flight_times_s: raw.flight_times_s,
+            slosh_in_body: raw.slosh_in_body,
+            nodes: Vec::new(),
+            elements: Vec::new(),
+            line_masses: Vec::new(),
+            point_masses: Vec::new(),
+            springs: Vec::new(),
+            points: Vec::new(),
+        };
+        for (i, beam) in raw.beam.into_iter().enumerate() {
+            self.beam(&mut stick, &materials, i, beam);
+        }
+        for (i, node) in stick.nodes.iter().enumerate() {
+            if self.nodes.insert(node.name.clone(), i).is_some() {
+                self.refuse("beam.piece.grids", format!("two grids `{}`", node.name), "one");
+            }
+        }
+        for (i, p) in raw.point_mass.into_iter().enumerate() {
+            let key = format!("point_mass[{i}]");
+            let (node, position_m) = self.link(&stick, &key, &p.grid, p.position_m);
+            for v in p.inertia_kg_m2 {
+                self.not_negative(format!("{key}.inertia_kg_m2"), v);
+            }
+            stick.point_masses.push(PointMass {
+                name: p.name,
+                node,
+                position_m,
+                mass_kg: self.history(&key, p.time_s, p.mass_kg),
+                inertia_kg_m2: p.inertia_kg_m2.into(),
+            });
+        }
+        for (i, p) in raw.point.into_iter().enumerate() {
+            let (node, position_m) =
+                self.link(&stick, &format!("point[{i}]"), &p.grid, p.position_m);
+            stick.points.push(Point { name: p.name, node, position_m });
+        }
+        for (i, s) in raw.spring.into_iter().enumerate() {
+            let key = format!("spring[{i}]");
+            for v in s.translation_n_m {
+                self.not_negative(format!("{key}.translation_n_m"), v);
+            }
+            for v in s.rotation_n_m_rad {
+                self.not_negative(format!("{key}.rotation_n_m_rad"), v);
+            }
+            let grids_key = format!("{key}.grids");
+            stick.springs.push(Spring {
+                nodes: [self.node(&grids_key, &s.grids[0]), self.node(&grids_key, &s.grids[1])],
+                position_m: self.vector(&format!("{key}.position_m"), s.position_m),
+                translation_n_m: s.translation_n_m.into(),
+                rotation_n_m_rad: s.rotation_n_m_rad.into(),
+            });
+        }
+        self.grid_names(&stick);
+        self.problems.into_result(stick)
+    }
+
+    fn materials(&mut self, raw: &[raw::Material]) -> BTreeMap<String, (f64, f64)> {
+        let mut materials = BTreeMap::new();
+        for (i, m) in raw.iter().enumerate() {
+            self.positive(format!("material[{i}].youngs_modulus_pa"), m.youngs_modulus_pa);
+            self.positive(format!("material[{i}].shear_modulus_pa"), m.shear_modulus_pa);
+            let moduli = (m.youngs_modulus_pa, m.shear_modulus_pa);
+            if materials.insert(m.name.clone(), moduli).is_some() {
+                self.refuse(
+                    format!("material[{i}].name"),
+                    format!("`{}` again", m.name),
+                    "a new name",
+                );
+            }
+        }
+        materials
+    }
+
+    fn link(
+        &mut self,
+        stick: &Stick,
+        key: &str,
+        grid: &str,
+        position_m: Option<[f64; 3]>,
+    ) -> (usize, Vector3<f64>) {
+        let node = self.node(&format!("{key}.grid"), grid);
+        let position = match position_m {
+            Some(p) => self.vector(&format!("{key}.position_m"), p),
+            // Without any node a problem is already noted.
+            None => stick.nodes.get(node).map_or_else(Vector3::zeros, |n| n.position_m),
+        };
+        (node, position)
+    }
+
+    fn grid_names(&mut self, stick: &Stick) {
+        let mut seen = std::collections::BTreeSet::new();
+        let names = (stick.point_masses.iter().map(|p| ("point_mass.name", &p.name)))
+            .chain(stick.points.iter().map(|p| ("point.name", &p.name)));
+        for (key, name) in names {
+            if name.is_empty() || self.nodes.contains_key(name) || !seen.insert(name) {
+                self.refuse(key, format!("`{name}`"), "a name that no other grid has");
+            }
+        }
+    }
+
+    fn beam(
+        &mut self,
+        stick: &mut Stick,
+        materials: &BTreeMap<String, (f64, f64)>,
+        index: usize,
+        beam: raw::Beam,
+    ) {
+        let key = format!("beam[{index}]");
+        let start = self.vector(&format!("{key}.start_m"), beam.start_m);
+        let end = self.vector(&format!("{key}.end_m"), beam.end_m);
+        self.finite(format!("{key}.first_station_m"), beam.first_station_m);
+        let length = (end - start).norm();
+        let Some(axes) = local_axes(end - start, beam.up.map(Vector3::from)) else {
+            self.refuse(
+                key,
+                format!("start_m {:?}, end_m {:?}, up {:?}", beam.start_m, beam.end_m, beam.up),
+                "two different points and `up` not along the beam",
+            );
+            return;
+        };
+        // Stations are read to a part in a thousand million of the beam; the last one is exact.
+        let tolerance = 1e-9 * length;
+        let first = beam.first_station_m;
+        let last = first + length;
+        let begin = stick.elements.len();
+        let mut from = first;
+        for (j, piece) in beam.piece.iter().enumerate() {
+            let key = format!("{key}.piece[{j}]");
+            let to = piece.to_station_m;
+            let is_last = j + 1 == beam.piece.len();
+            if !(to > from) || !(if is_last { (to - last).abs() } else { to - last } <= tolerance) {
+                self.refuse(
+                    format!("{key}.to_station_m"),
+                    to.to_string(),
+                    &format!("above {from}; the last piece ends at {last}"),
+                );
+                return;
+            }
+            if piece.elements == 0 {
+                self.refuse(format!("{key}.elements"), "0", "at least 1");
+                return;
+            }
+            let &(youngs_modulus_pa, shear_modulus_pa) =
+                materials.get(&piece.material).unwrap_or_else(|| {
+                    self.refuse(
+                        format!("{key}.material"),
+                        format!("`{}`", piece.material),
+                        "the name of a material",
+                    );
+                    &(1.0, 1.0)
+                });
+            let section = self.section(&format!("{key}.section"), &piece.section);
+            let end_section = match &piece.end_section {
+                Some(s) => self.section(&format!("{key}.end_section"), s),
+                None => section,
+            };
+            let to = if is_last { last } else { to };
+            let n = piece.elements;
+            for e in 0..=n {
+                if e == n && !is_last {
+                    break;
+                }
+                let station = from + (to - from) * e as f64 / n as f64;
+                stick.nodes.push(Node {
+                    name: format!("{}.{:02}", piece.grids, e + 1),
+                    position_m: start + (end - start) * ((station - first) / length),
+                });
+            }
+            // The first node of this piece stands `e` places before the node of element `e`.
+            let base = stick.nodes.len() - n - usize::from(is_last);
+            for e in 0..n {
+                let at = |k: usize| k as f64 / n as f64;
+                stick.elements.push(Element {
+                    nodes: [base + e, base + e + 1],
+                    stations_m: [from + (to - from) * at(e), from + (to - from) * at(e + 1)],
+                    axes,
+                    sections: [
+                        between(&section, &end_section, at(e)),
+                        between(&section, &end_section, at(e + 1)),
+                    ],
+                    youngs_modulus_pa,
+                    shear_modulus_pa,
+                });
+            }
+            from = to;
+        }
+        if beam.piece.is_empty() {
+            self.refuse(format!("{key}.piece"), "no piece", "at least one piece");
+        }
+        let range = begin..stick.elements.len();
+        for (j, mass) in beam.mass.into_iter().enumerate() {
+            let key = format!("{key}.mass[{j}]");
+            let mass = self.line_mass(&key, mass, [first, last], tolerance, range.clone());
+            stick.line_masses.push(mass);
+        }
+    }
+
+    fn line_mass(
+        &mut self,
+        key: &str,
+        raw: raw::LineMass,
+        [first, last]: [f64; 2],
+        tolerance: f64,
+        elements: std::ops::Range<usize>,
+    ) -> LineMass {
+        let from = raw.from_station_m.unwrap_or(first);
+        let to = raw.to_station_m.unwrap_or(last);
+        if !(from >= first - tolerance && to > from && to <= last + tolerance) {
+            self.refuse(
+                format!("{key}.from_station_m, to_station_m"),
+                format!("{from}, {to}"),
+                &format!("increasing, within {first} to {last}"),
+            );
+        }
+        if let Some(radius) = raw.gyration_m {
+            self.not_negative(format!("{key}.gyration_m"), radius);
+        }
+        self.not_negative(format!("{key}.slosh_kg"), raw.slosh_kg);
+        let least = raw.mass_kg.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = raw.mass_kg.iter().copied().fold(0.0, f64::max);
+        if !(raw.slosh_kg <= least) {
+            self.refuse(
+                format!("{key}.slosh_kg"),
+                raw.slosh_kg.to_string(),
+                "at most the least of mass_kg",
+            );
+        }
+        if let Some(full) = raw.full_kg {
+            self.positive(format!("{key}.full_kg"), full);
+            if !(most <= full) {
+                self.refuse(
+                    format!("{key}.full_kg"),
+                    full.to_string(),
+                    "at least the greatest of mass_kg",
+                );
+            }
+        }
+        LineMass {
+            mass_kg: self.history(key, raw.time_s, raw.mass_kg),
+            name: raw.name,
+            elements,
+            stations_m: [from.max(first), to.min(last)],
+            full_kg: raw.full_kg,
+            axial: raw.axial,
+            torsion: raw.torsion,
+            gyration_m: raw.gyration_m,
+            slosh_kg: raw.slosh_kg,
+        }
+    }
+}
+
+/// Section a fraction `w` of the way along a piece, of the same form as its ends where it can be.
+fn between(start: &Section, end: &Section, w: f64) -> Section {
+    match (start, end) {
+        (
+            Section::Tube { radius_m: r0, thickness_m: t0 },
+            Section::Tube { radius_m: r1, thickness_m: t1 },
+        ) => Section::Tube { radius_m: r0 + w * (r1 - r0), thickness_m: t0 + w * (t1 - t0) },
+        _ => Section::General(start.toward(end, w)),
+    }
+}
+
+/// Rows: unit vectors along the beam, local y = z × x, and local z towards `up`.
+fn local_axes(along: Vector3<f64>, up: Option<Vector3<f64>>) -> Option<Matrix3<f64>> {
+    let x = along.try_normalize(0.0)?;
+    let up = up.unwrap_or(if x.z.abs() < 0.9 { Vector3::z() } else { Vector3::y() });
+    // Within a thousandth of a radian of the axis the direction of z is not meant seriously.
+    let y = up.try_normalize(0.0)?.cross(&x).try_normalize(1e-3)?;
+    let z = x.cross(&y);
+    let axes = Matrix3::from_rows(&[x.transpose(), y.transpose(), z.transpose()]);
+    axes.iter().all(|v| v.is_finite()).then_some(axes)
+}
