@@ -17,6 +17,12 @@ macro_rules! embedded {
 const FILES: &[(&str, &[u8])] = embedded![
     "vehicles/sls-like/vehicle.toml",
     "vehicles/sls-like/stick.toml",
+    "vehicles/sls-like/modes/package.toml",
+    "vehicles/sls-like/modes/tables/grids.parquet",
+    "vehicles/sls-like/modes/tables/mass.parquet",
+    "vehicles/sls-like/modes/tables/modes.parquet",
+    "vehicles/sls-like/modes/tables/parents.parquet",
+    "vehicles/sls-like/modes/tables/shapes.parquet",
     "dispersions/reference.toml",
     "runs/reference.toml",
     "runs/all-engines.toml",
@@ -36,4 +42,37 @@ pub fn write(target: &Path) -> Result<Vec<&'static str>, Problems> {
         FILES.iter().map(|(path, bytes)| (path.into(), bytes.to_vec())).collect();
     folder::write(target, &contents, None)?;
     Ok(FILES.iter().map(|(path, _)| *path).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::scenario;
+    use super::*;
+
+    #[test]
+    fn every_run_of_the_scaffold_loads_and_a_folder_that_exists_is_refused() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("study");
+        let paths = write(&target).unwrap();
+        let runs: Vec<&&str> = paths.iter().filter(|p| p.starts_with("runs/")).collect();
+        assert_eq!(runs.len(), 3);
+        for run in runs {
+            let loaded = scenario::load(&target.join(run)).unwrap();
+            assert_eq!(loaded.vehicle.vehicle.name, "SLS-like, synthetic");
+        }
+        let problems = write(&target).unwrap_err();
+        assert!(problems.0[0].found.contains("exists"), "{problems}");
+        assert!(scenario::load(&target.join("runs/smoke.toml")).is_ok());
+    }
+
+    #[test]
+    fn the_scaffold_is_the_repository() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        for (path, bytes) in FILES {
+            let mut file = files::open(&root.join(path)).unwrap();
+            let mut stored = Vec::new();
+            std::io::Read::read_to_end(&mut file, &mut stored).unwrap();
+            assert!(stored == *bytes, "{path}");
+        }
+    }
 }
