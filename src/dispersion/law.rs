@@ -37,7 +37,9 @@ impl Position {
 
     /// The place whose normal score Φ⁻¹(F) is `score`.
     pub fn of_score(score: f64) -> Self {
-        Self { below: normal::below(score), above: normal::above(score), score }
+        let tail = normal::above(score.abs());
+        let (below, above) = if score < 0.0 { (tail, 1.0 - tail) } else { (1.0 - tail, tail) };
+        Self { below, above, score }
     }
 
     fn of_tails(below: f64, above: f64) -> Self {
@@ -79,7 +81,7 @@ enum Shape {
     TruncatedNormal {
         mean: f64,
         sigma: f64,
-        scores: [f64; 2],
+        law: normal::Truncated,
         range: [f64; 2],
     },
     Uniform {
@@ -190,7 +192,7 @@ impl Law {
         let within = "a bound within 37 sigma of the mean, so that the law has probability";
         require("low", scores[0] <= LARGEST_TRUNCATION, range[0], within)?;
         require("high", scores[1] >= -LARGEST_TRUNCATION, range[1], within)?;
-        Ok(Self(Shape::TruncatedNormal { mean, sigma, scores, range }))
+        Ok(Self(Shape::TruncatedNormal { mean, sigma, law: normal::Truncated::new(scores), range }))
     }
 
     /// Uniform on [low, high].
@@ -336,9 +338,8 @@ impl Law {
         match &self.0 {
             Shape::Fixed { value } => *value,
             Shape::Normal { mean, sigma } => mean + sigma * score,
-            Shape::TruncatedNormal { mean, sigma, scores, range } => {
-                let z = normal::truncated_score(scores[0], scores[1], below, above);
-                within(mean + sigma * z, range[0], range[1])
+            Shape::TruncatedNormal { mean, sigma, law, range } => {
+                within(mean + sigma * law.score(below, above), range[0], range[1])
             }
             Shape::Uniform { low, high } => within(above * low + below * high, *low, *high),
             Shape::Triangular { low, mode, high } => {
@@ -398,11 +399,7 @@ impl Law {
                 let z = (x - mean) / sigma;
                 (normal::below(z), normal::above(z))
             }
-            Shape::TruncatedNormal { mean, sigma, scores, .. } => {
-                let z = ((x - mean) / sigma).clamp(scores[0], scores[1]);
-                let total = normal::between(scores[0], scores[1]);
-                (normal::between(scores[0], z) / total, normal::between(z, scores[1]) / total)
-            }
+            Shape::TruncatedNormal { mean, sigma, law, .. } => law.tails((x - mean) / sigma),
             Shape::Uniform { low, high } => ((x - low) / (high - low), (high - x) / (high - low)),
             Shape::Triangular { low, mode, high } => {
                 let width = high - low;

@@ -32,7 +32,7 @@ pub fn above(z: f64) -> f64 {
 
 /// Φ(b) − Φ(a) for a ≤ b, without cancellation where the two lie on different sides of zero or
 /// in the same tail.
-pub fn between(a: f64, b: f64) -> f64 {
+fn between(a: f64, b: f64) -> f64 {
     if a > 0.0 {
         above(a) - above(b)
     } else if b < 0.0 {
@@ -54,22 +54,47 @@ pub fn score(below: f64, above: f64) -> f64 {
     }
 }
 
-/// The score of the standard normal law truncated to [a, b] with the share `below` of its
-/// probability beneath it and `above` = 1 − `below` over it.
-pub fn truncated_score(a: f64, b: f64, below: f64, above: f64) -> f64 {
-    // Φ(z) = above Φ(a) + below Φ(b), written for erf in the middle and for the nearer tail
-    // elsewhere: no form subtracts numbers that are nearly equal.
-    let mean = |f: fn(f64) -> f64| above * f(a) + below * f(b);
-    let middle = mean(|z| erf(z * FRAC_1_SQRT_2));
-    let z = if middle.abs() <= 0.5 {
-        SQRT_2 * erf_inv(middle)
-    } else if middle < 0.0 {
-        -SQRT_2 * erfc_inv(2.0 * mean(self::below))
-    } else {
-        SQRT_2 * erfc_inv(2.0 * mean(self::above))
-    };
-    // Rounding of the last digit must not step over a bound; no probability is moved.
-    z.clamp(a, b)
+/// The standard normal law truncated to [a, b].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truncated {
+    scores: [f64; 2],
+    erf: [f64; 2],
+    below: [f64; 2],
+    above: [f64; 2],
+}
+
+impl Truncated {
+    /// Truncated to scores a < b, which may be infinite.
+    pub fn new(scores: [f64; 2]) -> Self {
+        let erf = scores.map(|z| erf(z * FRAC_1_SQRT_2));
+        Self { scores, erf, below: scores.map(below), above: scores.map(above) }
+    }
+
+    /// The score with the share `below` of the law's probability beneath it and `above` =
+    /// 1 − `below` over it.
+    pub fn score(&self, below: f64, above: f64) -> f64 {
+        // Φ(z) = above Φ(a) + below Φ(b), written for erf in the middle and for the nearer tail
+        // elsewhere: no form subtracts numbers that are nearly equal.
+        let mean = |ends: [f64; 2]| above * ends[0] + below * ends[1];
+        let middle = mean(self.erf);
+        let z = if middle.abs() <= 0.5 {
+            SQRT_2 * erf_inv(middle)
+        } else if middle < 0.0 {
+            -SQRT_2 * erfc_inv(2.0 * mean(self.below))
+        } else {
+            SQRT_2 * erfc_inv(2.0 * mean(self.above))
+        };
+        // Rounding of the last digit must not step over a bound; no probability is moved.
+        z.clamp(self.scores[0], self.scores[1])
+    }
+
+    /// The shares of the law's probability beneath and above the score `z`.
+    pub fn tails(&self, z: f64) -> (f64, f64) {
+        let [a, b] = self.scores;
+        let z = z.clamp(a, b);
+        let total = between(a, b);
+        (between(a, z) / total, between(z, b) / total)
+    }
 }
 
 #[cfg(test)]
@@ -125,7 +150,7 @@ mod tests {
         assert_eq!(below(0.0), 0.5);
         assert_eq!(above(0.0), 0.5);
         assert_eq!(score(0.5, 0.5), 0.0);
-        assert_eq!(truncated_score(-3.0, 3.0, 0.5, 0.5), 0.0);
+        assert_eq!(Truncated::new([-3.0, 3.0]).score(0.5, 0.5), 0.0);
         assert_eq!(between(-f64::INFINITY, f64::INFINITY), 1.0);
     }
 
@@ -141,8 +166,8 @@ mod tests {
             (1.0 / 9_007_199_254_740_992.0, -3.0, 3.0, -2.999_999_999_999_975_016_6),
             (0.3, -1.0, 2.0, -0.242_403_817_889_226_826_23),
         ] {
-            let (upper, lower) =
-                (truncated_score(a, b, u, 1.0 - u), truncated_score(-b, -a, 1.0 - u, u));
+            let upper = Truncated::new([a, b]).score(u, 1.0 - u);
+            let lower = Truncated::new([-b, -a]).score(1.0 - u, u);
             assert!((upper / z - 1.0).abs() < 4e-15, "{u} [{a}, {b}]: {upper}");
             assert!((lower / z + 1.0).abs() < 4e-15, "{u} [{a}, {b}]: {lower}");
         }
