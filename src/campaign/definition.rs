@@ -2,8 +2,11 @@
 
 pub use crate::dynamics::NozzleJet;
 
+use serde::{Deserialize, Serialize};
+
 /// Where the gimbal slope comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Slope {
     /// Improved Virtual Grid, equations (15) to (22).
     VirtualGrid,
@@ -12,7 +15,7 @@ pub enum Slope {
 }
 
 /// One way to evaluate a draw; all variants of a run share the draws, so that differences are paired.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Variant {
     /// Name, `[a-z0-9_]+`.
     pub name: String,
@@ -29,7 +32,7 @@ pub struct Variant {
 }
 
 /// A set of cases evaluated in one run; tables hold populations in this order.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Population {
     /// Name, `[a-z0-9_]+`: `nominal`, `dispersed`, a corner's name, or that name and `_dispersed`.
     pub name: String,
@@ -42,7 +45,7 @@ pub struct Population {
 }
 
 /// A run definition, validated against its vehicle and dispersion.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Definition {
     /// Name of the run; default folder of the results.
     pub name: String,
@@ -60,4 +63,24 @@ pub struct Definition {
     pub gimballed: Vec<bool>,
     /// Second-best to best overlap above which a case is followed by homotopy and both poles are stored.
     pub exchange_ratio: f64,
+}
+
+impl Definition {
+    /// Sets the number of cases of the dispersed population and of every corner's Monte Carlo.
+    pub fn set_cases(&mut self, cases: u64) {
+        for population in self.populations.iter_mut().filter(|p| p.drawn) {
+            population.cases = cases;
+        }
+    }
+
+    /// Fixes the draws of the corner at index `population` and of the Monte Carlo around it, which
+    /// follows if there is one.
+    pub fn fix_corner(&mut self, population: usize, fixed: &[(usize, f64)]) {
+        let around = format!("{}_dispersed", self.populations[population].name);
+        for (index, member) in self.populations.iter_mut().enumerate() {
+            if index == population || member.name == around {
+                member.fixed = fixed.to_vec();
+            }
+        }
+    }
 }

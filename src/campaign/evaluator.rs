@@ -5,7 +5,7 @@
 
 use super::draw::Slots;
 use super::{Branch, Definition, Evaluation, Failure, FailureKind, Pole, Record, Variant};
-use crate::dispersion::{Affine, Dispersion, Draws, Sampler};
+use crate::dispersion::{Affine, Cursor, Dispersion, Sampler};
 use crate::dynamics::{DrawnVehicle, Effects, Model, Plant};
 use crate::modal::{self, Reference, Solver, eigen, identify};
 use crate::vehicle::Vehicle;
@@ -89,29 +89,25 @@ impl AtTime {
 }
 
 /// Buffers of one worker.
-struct Workspace {
+struct Workspace<'a> {
     solvers: Vec<(usize, Solver)>,
-    draws: Draws,
+    cursor: Cursor<'a>,
     vehicle: DrawnVehicle,
     poles: Vec<Complex<f64>>,
 }
 
-impl Workspace {
-    fn solver(&mut self, coordinates: usize) -> usize {
-        let known = self.solvers.iter().position(|(size, _)| *size == coordinates);
-        known.unwrap_or_else(|| {
-            self.solvers.push((coordinates, Solver::new(coordinates)));
-            self.solvers.len() - 1
-        })
-    }
+/// The solver for models of `size` coordinates, made when first needed.
+fn solver(solvers: &mut Vec<(usize, Solver)>, size: usize) -> &mut Solver {
+    let known = solvers.iter().position(|(of, _)| *of == size);
+    let index = known.unwrap_or_else(|| {
+        solvers.push((size, Solver::new(size)));
+        solvers.len() - 1
+    });
+    &mut solvers[index].1
 }
 
 /// One evaluation as it is made: the model and what was found in it.
 pub struct View<'a> {
-    /// Index of the flight time.
-    pub flight_time: usize,
-    /// Index of the variant.
-    pub variant: usize,
     /// Plant of the evaluation.
     pub plant: &'a Plant,
     /// Model of the evaluation; zero where the draw failed.
@@ -123,12 +119,12 @@ pub struct View<'a> {
 /// Evaluates the cases of one run.
 pub struct Evaluator<'a> {
     definition: &'a Definition,
-    sampler: Sampler<'a>,
+    sampler: &'a Sampler<'a>,
     vehicle: &'a Vehicle,
     /// Flight times, in the order of the definition.
     pub times: Vec<AtTime>,
     all_poles: bool,
-    workspaces: Mutex<Vec<Workspace>>,
+    workspaces: Mutex<Vec<Workspace<'a>>>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -141,18 +137,18 @@ impl<'a> Evaluator<'a> {
     /// See [`Error`].
     pub fn new(
         vehicle: &'a Vehicle,
-        dispersion: &'a Dispersion,
+        sampler: &'a Sampler<'a>,
         definition: &'a Definition,
         all_poles: bool,
     ) -> Result<Self, Error> {
         let times = definition
             .flight_times_s
             .par_iter()
-            .map(|&time_s| at_time(vehicle, dispersion, definition, time_s))
+            .map(|&time_s| at_time(vehicle, sampler.dispersion(), definition, time_s))
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
             definition,
-            sampler: Sampler::new(dispersion, definition.seed),
+            sampler,
             vehicle,
             times,
             all_poles,
@@ -168,62 +164,55 @@ impl<'a> Evaluator<'a> {
     /// Like [`Evaluator::evaluate`], showing every evaluation with its model to `look`.
     pub fn visit(&self, population: usize, case: u64, mut look: impl FnMut(&View<'_>)) -> Record {
         let mut workspace = self.take();
+        let Workspace { solvers, cursor, vehicle, poles } = &mut workspace;
         let rule = &self.definition.populations[population];
-        self.sampler.draw(case, &rule.fixed, rule.drawn, &mut workspace.draws);
+        let draws = cursor.draw(case, &rule.fixed, rule.drawn);
         let mut evaluations = Vec::new();
         for (flight_time, at) in self.times.iter().enumerate() {
-            let drawn = at.slots.draw(
-                self.vehicle,
-                self.sampler.parameters(),
-                &workspace.draws.effects,
-                &mut workspace.vehicle,
-            );
+            let parameters = self.sampler.dispersion().parameters();
+            let drawn = at.slots.draw(self.vehicle, parameters, &draws.effects, vehicle);
             for variant in 0..at.variants.len() {
                 let plant = at.plant(variant);
-                let mut model = Model::zeros(plant.layout.coordinates());
-                let outcome =
-                    drawn.clone().and_then(|()| self.solve(at, variant, &mut model, &mut workspace));
+                let size = plant.layout.coordinates();
+                let mut model = Model::zeros(size);
+                let solver = solver(solvers, size);
+                let outcome = drawn.clone().and_then(|()| {
+                    self.solve(at, variant, vehicle, &mut model, solver, poles)
+                });
                 let evaluation = Evaluation { variant, flight_time, outcome };
-                look(&View { flight_time, variant, plant, model: &model, evaluation: &evaluation });
+                look(&View { plant, model: &model, evaluation: &evaluation });
                 evaluations.push(evaluation);
             }
         }
-        let record = Record {
-            population,
-            case,
-            values: workspace.draws.values.clone(),
-            scores: workspace.draws.scores.clone(),
-            evaluations,
-        };
+        let (values, scores) = (draws.values.clone(), draws.scores.clone());
         self.workspaces.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
-        record
+        Record { population, case, values, scores, evaluations }
     }
 
-    fn take(&self) -> Workspace {
+    fn take(&self) -> Workspace<'a> {
         let idle = self.workspaces.lock().unwrap_or_else(PoisonError::into_inner).pop();
         idle.unwrap_or_else(|| Workspace {
             solvers: Vec::new(),
-            draws: Draws::default(),
+            cursor: self.sampler.cursor(),
             vehicle: DrawnVehicle::default(),
             poles: Vec::new(),
         })
     }
 
-    /// The poles of the vehicle drawn in `workspace`, with `model` filled.
+    /// Solves one variant of the drawn `vehicle`; fills `model`.
     fn solve(
         &self,
         at: &AtTime,
         variant: usize,
+        vehicle: &DrawnVehicle,
         model: &mut Model,
-        workspace: &mut Workspace,
+        solver: &mut Solver,
+        poles: &mut Vec<Complex<f64>>,
     ) -> Result<Vec<Pole>, Failure> {
         let prepared = &at.variants[variant];
         let plant = at.plant(variant);
-        plant.assemble(&workspace.vehicle, &prepared.effects, model);
-        let index = workspace.solver(model.coordinates());
-        let Workspace { solvers, poles, .. } = workspace;
-        let solver = &mut solvers[index].1;
-        solver.poles(model, poles).map_err(|error| failure_of(&error))?;
+        plant.assemble(vehicle, &prepared.effects, model);
+        solver.poles(model, poles).map_err(|error| Failure::from(&error))?;
         let mut scratch = Model::zeros(model.coordinates());
         let mut rows = Vec::new();
         for (mode, reference) in prepared.references.iter().enumerate() {
@@ -261,7 +250,7 @@ impl<'a> Evaluator<'a> {
 
     fn lost(&self, mode: usize, lost: identify::Lost) -> Failure {
         match lost {
-            identify::Lost::Solve(error) => failure_of(&error),
+            identify::Lost::Solve(error) => Failure::from(&error),
             identify::Lost::Overlap { .. } => Failure::new(
                 FailureKind::IdentityLost,
                 format!("mode {}: {lost}", self.definition.modes[mode]),
@@ -296,14 +285,16 @@ fn named_pole(
     })
 }
 
-fn failure_of(error: &eigen::Error) -> Failure {
-    let kind = match error {
-        eigen::Error::NonFinite(_) => FailureKind::NonFinite,
-        eigen::Error::SingularMass { .. } => FailureKind::SingularMass,
-        eigen::Error::NoConvergence => FailureKind::NoConvergence,
-        eigen::Error::Trace { .. } => FailureKind::Residual,
-    };
-    Failure::new(kind, error.to_string())
+impl From<&eigen::Error> for Failure {
+    fn from(error: &eigen::Error) -> Self {
+        let kind = match error {
+            eigen::Error::NonFinite(_) => FailureKind::NonFinite,
+            eigen::Error::SingularMass { .. } => FailureKind::SingularMass,
+            eigen::Error::NoConvergence => FailureKind::NoConvergence,
+            eigen::Error::Trace { .. } => FailureKind::Residual,
+        };
+        Self::new(kind, error.to_string())
+    }
 }
 
 /// Prepares one flight time.

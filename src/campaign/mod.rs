@@ -1,8 +1,21 @@
 //! A campaign: cases evaluated in a parallel pool, their records and what they sum up to.
 
+pub mod corner;
 pub mod definition;
+pub mod draw;
+pub mod evaluator;
+pub mod metric;
+pub mod outline;
 pub mod plant;
+pub mod pool;
 pub mod record;
+pub mod row;
+pub mod summary;
+#[cfg(test)]
+pub mod synthetic;
 
 pub use definition::{Definition, NozzleJet, Population, Slope, Variant};
+pub use evaluator::Evaluator;
+pub use outline::{DrawColumn, Input, Outline, StoredPoles};
+pub use pool::{Pool, Progress, Span};
 pub use record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};

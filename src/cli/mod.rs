@@ -7,10 +7,17 @@ pub mod actuator;
 pub mod check;
 pub mod completions;
 pub mod error;
+pub mod how_many;
 pub mod init;
 pub mod modes;
+pub mod nominal;
+pub mod plan;
 pub mod planar;
+pub mod progress;
+pub mod replay;
+pub mod run;
 pub mod schema;
+pub mod summary;
 
 pub use error::Error;
 
@@ -32,7 +39,7 @@ pub const INCONCLUSIVE: u8 = 4;
 /// Monte Carlo dispersion engine for thrust vector servoelastic coupling.
 #[derive(Parser)]
 #[command(name = "tvse", version, about, propagate_version = true)]
-struct Arguments {
+pub struct Arguments {
     #[command(subcommand)]
     command: Command,
 }
@@ -41,7 +48,13 @@ struct Arguments {
 enum Command {
     Init(init::Args),
     Check(check::Args),
+    Plan(plan::Args),
     Modes(modes::Args),
+    Nominal(nominal::Args),
+    Run(run::Args),
+    Summary(summary::Args),
+    Replay(replay::Args),
+    HowMany(how_many::Args),
     Planar(planar::Args),
     Actuator(actuator::Args),
     Schema(schema::Args),
@@ -55,7 +68,13 @@ pub fn run() -> ExitCode {
     let result: Result<u8, Error> = match &arguments.command {
         Command::Init(args) => init::run(args, &mut out),
         Command::Check(args) => check::run(args, &mut out),
+        Command::Plan(args) => plan::run(args, &mut out),
         Command::Modes(args) => modes::run(args, &mut out),
+        Command::Nominal(args) => nominal::run(args, &mut out),
+        Command::Run(args) => run::run(args, &mut out),
+        Command::Summary(args) => summary::run(args, &mut out),
+        Command::Replay(args) => replay::run(args, &mut out),
+        Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),
         Command::Actuator(args) => actuator::run(args, &mut out),
         Command::Schema(args) => schema::run(args, &mut out),

@@ -85,3 +85,50 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     writeln!(out, "written to {}", output.display())?;
     Ok(PASS)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn run_line(words: &[&str]) -> Result<String, Error> {
+        let line = Line::try_parse_from(words).unwrap_or_else(|e| panic!("{e}"));
+        let mut out = Vec::new();
+        run(&line.args, &mut out).map(|code| {
+            assert_eq!(code, PASS);
+            String::from_utf8(out).unwrap()
+        })
+    }
+
+    #[test]
+    fn a_package_is_made_once_and_shown_as_it_was_made() {
+        let stick = concat!(env!("CARGO_MANIFEST_DIR"), "/vehicles/sls-like/stick.toml");
+        let place = tempfile::tempdir().unwrap();
+        let dir = place.path().join("modes");
+        let dir = dir.to_str().unwrap();
+        let words = ["modes", stick, "-o", dir, "--times", "95,100", "--count", "6"];
+        let made = run_line(&words).unwrap();
+        let shown = run_line(&["modes", "--show", dir]).unwrap();
+        assert!(made.starts_with(&shown), "{made}\n{shown}");
+        assert!(shown.contains("SLS-like, synthetic") && shown.contains("m006"), "{shown}");
+        assert_eq!(run_line(&words).unwrap_err().code(), crate::cli::USAGE);
+        run_line(&[&words[..], &["--force"]].concat()).unwrap();
+    }
+
+    #[test]
+    fn a_time_outside_the_tables_and_a_missing_file_are_wrong_usage() {
+        let stick = concat!(env!("CARGO_MANIFEST_DIR"), "/vehicles/sls-like/stick.toml");
+        let late = run_line(&["modes", stick, "-o", "never", "--times", "900"]).unwrap_err();
+        assert!(late.to_string().contains("900 s"), "{late}");
+        assert_eq!(late.code(), crate::cli::USAGE);
+        let none = run_line(&["modes", "no-such.toml", "-o", "never"]).unwrap_err();
+        assert_eq!(none.code(), crate::cli::USAGE);
+        assert!(!std::path::Path::new("never").exists());
+    }
+}

@@ -37,7 +37,9 @@ impl Position {
 
     /// The place whose normal score Φ⁻¹(F) is `score`.
     pub fn of_score(score: f64) -> Self {
-        Self { below: normal::below(score), above: normal::above(score), score }
+        let tail = normal::above(score.abs());
+        let (below, above) = if score < 0.0 { (tail, 1.0 - tail) } else { (1.0 - tail, tail) };
+        Self { below, above, score }
     }
 
     fn of_tails(below: f64, above: f64) -> Self {
@@ -79,7 +81,7 @@ enum Shape {
     TruncatedNormal {
         mean: f64,
         sigma: f64,
-        scores: [f64; 2],
+        law: normal::Truncated,
         range: [f64; 2],
     },
     Uniform {
@@ -190,7 +192,7 @@ impl Law {
         let within = "a bound within 37 sigma of the mean, so that the law has probability";
         require("low", scores[0] <= LARGEST_TRUNCATION, range[0], within)?;
         require("high", scores[1] >= -LARGEST_TRUNCATION, range[1], within)?;
-        Ok(Self(Shape::TruncatedNormal { mean, sigma, scores, range }))
+        Ok(Self(Shape::TruncatedNormal { mean, sigma, law: normal::Truncated::new(scores), range }))
     }
 
     /// Uniform on [low, high].
@@ -336,9 +338,8 @@ impl Law {
         match &self.0 {
             Shape::Fixed { value } => *value,
             Shape::Normal { mean, sigma } => mean + sigma * score,
-            Shape::TruncatedNormal { mean, sigma, scores, range } => {
-                let z = normal::truncated_score(scores[0], scores[1], below, above);
-                within(mean + sigma * z, range[0], range[1])
+            Shape::TruncatedNormal { mean, sigma, law, range } => {
+                within(mean + sigma * law.score(below, above), range[0], range[1])
             }
             Shape::Uniform { low, high } => within(above * low + below * high, *low, *high),
             Shape::Triangular { low, mode, high } => {
@@ -363,8 +364,15 @@ impl Law {
                 let upper =
                     probabilities.partition_point(|&p| p < below).clamp(1, values.len() - 1);
                 let (p, v) = (&probabilities[upper - 1..=upper], &values[upper - 1..=upper]);
-                let share = (below - p[0]) / (p[1] - p[0]);
-                within((1.0 - share) * v[0] + share * v[1], v[0], v[1])
+                // Shares of the two ends, the one of the nearer tail first.
+                let (from, to) = if below <= above {
+                    let to = (below - p[0]) / (p[1] - p[0]);
+                    (1.0 - to, to)
+                } else {
+                    let from = (above - (1.0 - p[1])) / (p[1] - p[0]);
+                    (from, 1.0 - from)
+                };
+                within(from * v[0] + to * v[1], v[0], v[1])
             }
         }
     }
@@ -391,11 +399,7 @@ impl Law {
                 let z = (x - mean) / sigma;
                 (normal::below(z), normal::above(z))
             }
-            Shape::TruncatedNormal { mean, sigma, scores, .. } => {
-                let z = ((x - mean) / sigma).clamp(scores[0], scores[1]);
-                let total = normal::between(scores[0], scores[1]);
-                (normal::between(scores[0], z) / total, normal::between(z, scores[1]) / total)
-            }
+            Shape::TruncatedNormal { mean, sigma, law, .. } => law.tails((x - mean) / sigma),
             Shape::Uniform { low, high } => ((x - low) / (high - low), (high - x) / (high - low)),
             Shape::Triangular { low, mode, high } => {
                 let width = high - low;
@@ -423,9 +427,9 @@ impl Law {
             Shape::Empirical { probabilities, values } => {
                 // The last entry at or below x, so that equal values count up to the last.
                 let i = values.partition_point(|&v| v <= x) - 1;
-                let share = (x - values[i]) / (values[i + 1] - values[i]);
-                let below = (1.0 - share) * probabilities[i] + share * probabilities[i + 1];
-                (below, 1.0 - below)
+                let (p, v) = (&probabilities[i..=i + 1], &values[i..=i + 1]);
+                let (from, to) = ((v[1] - x) / (v[1] - v[0]), (x - v[0]) / (v[1] - v[0]));
+                (from * p[0] + to * p[1], from * (1.0 - p[0]) + to * (1.0 - p[1]))
             }
         }
     }
@@ -498,9 +502,9 @@ impl Law {
     /// that was computed from sigma, or none of its discrete values.
     pub fn is_outside(&self, x: f64) -> bool {
         let [low, high] = self.support();
-        let rounding =
-            |end: f64| if end.is_finite() { 4.0 * f64::EPSILON * end.abs() } else { 0.0 };
-        let inside = low - rounding(low) <= x && x <= high + rounding(high);
+        let size = [low, high].map(|end| if end.is_finite() { end.abs() } else { 0.0 });
+        let rounding = 4.0 * f64::EPSILON * size[0].max(size[1]);
+        let inside = low - rounding <= x && x <= high + rounding;
         match &self.0 {
             Shape::Discrete { values, .. } => !values.contains(&x),
             _ => !inside,

@@ -8,7 +8,7 @@
 mod beta;
 pub mod draw;
 #[cfg(test)]
-mod fixture;
+pub(crate) mod fixture;
 pub mod law;
 pub mod normal;
 pub mod parameter;

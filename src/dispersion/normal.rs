@@ -2,7 +2,10 @@
 //!
 //! Laws are not known here.
 
-use statrs::function::erf;
+use libm::{erf, erfc};
+// The inverses of `statrs` are good to the last digits; its erf and erfc are not used, since their
+// rational approximations carry constants cut to ten digits.
+use statrs::function::erf::{erf_inv, erfc_inv};
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
 /// Φ(z), the probability below `z`; relative error below 1e-14 down to the smallest normal
@@ -16,27 +19,26 @@ pub fn above(z: f64) -> f64 {
     if z < 0.0 {
         return 1.0 - above(-z);
     }
-    // erfc(t) at the rounded t = z/√2 varies as exp(−t²), and is itself computed with a rounded
-    // t²: together a relative error near z² ε. The factor exp(t·t − z²/2), with t·t as rounded
-    // and z² exact as square + rest, takes it away.
+    // erfc(t) varies as exp(−t²), so that rounding t = z/√2 alone costs a relative z² ε. The
+    // factor exp(t² − z²/2) takes it away, with both squares as product and rest.
     let t = z * FRAC_1_SQRT_2;
-    let square = z * z;
-    let rest = z.mul_add(z, -square);
-    let correction = (t * t - 0.5 * square) - 0.5 * rest;
-    let value = 0.5 * erf::erfc(t);
-    // Below z = 1 the correction is below the rounding, and erfc is not of that form.
+    let (t_square, z_square) = (t * t, z * z);
+    let rest = t.mul_add(t, -t_square) - 0.5 * z.mul_add(z, -z_square);
+    let correction = (t_square - 0.5 * z_square) + rest;
+    let value = 0.5 * erfc(t);
+    // An infinite z has no correction; and below 1 erfc is not of that form, nor does it matter.
     if z > 1.0 && correction.is_finite() { value + value * correction } else { value }
 }
 
 /// Φ(b) − Φ(a) for a ≤ b, without cancellation where the two lie on different sides of zero or
 /// in the same tail.
-pub fn between(a: f64, b: f64) -> f64 {
+fn between(a: f64, b: f64) -> f64 {
     if a > 0.0 {
         above(a) - above(b)
     } else if b < 0.0 {
         below(b) - below(a)
     } else {
-        0.5 * (erf::erf(b * FRAC_1_SQRT_2) - erf::erf(a * FRAC_1_SQRT_2))
+        0.5 * (erf(b * FRAC_1_SQRT_2) - erf(a * FRAC_1_SQRT_2))
     }
 }
 
@@ -46,28 +48,53 @@ pub fn score(below: f64, above: f64) -> f64 {
     if below == above {
         0.0
     } else if below < above {
-        -SQRT_2 * erf::erfc_inv(2.0 * below)
+        -SQRT_2 * erfc_inv(2.0 * below)
     } else {
-        SQRT_2 * erf::erfc_inv(2.0 * above)
+        SQRT_2 * erfc_inv(2.0 * above)
     }
 }
 
-/// The score of the standard normal law truncated to [a, b] with the share `below` of its
-/// probability beneath it and `above` = 1 − `below` over it.
-pub fn truncated_score(a: f64, b: f64, below: f64, above: f64) -> f64 {
-    // Φ(z) = above Φ(a) + below Φ(b), written for erf in the middle and for the nearer tail
-    // elsewhere: no form subtracts numbers that are nearly equal.
-    let mean = |f: fn(f64) -> f64| above * f(a) + below * f(b);
-    let middle = mean(|z| erf::erf(z * FRAC_1_SQRT_2));
-    let z = if middle.abs() <= 0.5 {
-        SQRT_2 * erf::erf_inv(middle)
-    } else if middle < 0.0 {
-        -SQRT_2 * erf::erfc_inv(2.0 * mean(self::below))
-    } else {
-        SQRT_2 * erf::erfc_inv(2.0 * mean(self::above))
-    };
-    // Rounding of the last digit must not step over a bound; no probability is moved.
-    z.clamp(a, b)
+/// The standard normal law truncated to [a, b].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Truncated {
+    scores: [f64; 2],
+    erf: [f64; 2],
+    below: [f64; 2],
+    above: [f64; 2],
+}
+
+impl Truncated {
+    /// Truncated to scores a < b, which may be infinite.
+    pub fn new(scores: [f64; 2]) -> Self {
+        let erf = scores.map(|z| erf(z * FRAC_1_SQRT_2));
+        Self { scores, erf, below: scores.map(below), above: scores.map(above) }
+    }
+
+    /// The score with the share `below` of the law's probability beneath it and `above` =
+    /// 1 − `below` over it.
+    pub fn score(&self, below: f64, above: f64) -> f64 {
+        // Φ(z) = above Φ(a) + below Φ(b), written for erf in the middle and for the nearer tail
+        // elsewhere: no form subtracts numbers that are nearly equal.
+        let mean = |ends: [f64; 2]| above * ends[0] + below * ends[1];
+        let middle = mean(self.erf);
+        let z = if middle.abs() <= 0.5 {
+            SQRT_2 * erf_inv(middle)
+        } else if middle < 0.0 {
+            -SQRT_2 * erfc_inv(2.0 * mean(self.below))
+        } else {
+            SQRT_2 * erfc_inv(2.0 * mean(self.above))
+        };
+        // Rounding of the last digit must not step over a bound; no probability is moved.
+        z.clamp(self.scores[0], self.scores[1])
+    }
+
+    /// The shares of the law's probability beneath and above the score `z`.
+    pub fn tails(&self, z: f64) -> (f64, f64) {
+        let [a, b] = self.scores;
+        let z = z.clamp(a, b);
+        let total = between(a, b);
+        (between(a, z) / total, between(z, b) / total)
+    }
 }
 
 #[cfg(test)]
@@ -75,6 +102,7 @@ mod tests {
     use super::*;
 
     /// 1 − Φ(z), evaluated with 40 digits (mpmath `ncdf`).
+    #[expect(clippy::excessive_precision, reason = "digits as the reference gives them")]
     const TAIL: [(f64, f64); 12] = [
         (0.5, 0.308_537_538_725_986_896_36),
         (1.0, 0.158_655_253_931_457_051_41),
@@ -122,11 +150,12 @@ mod tests {
         assert_eq!(below(0.0), 0.5);
         assert_eq!(above(0.0), 0.5);
         assert_eq!(score(0.5, 0.5), 0.0);
-        assert_eq!(truncated_score(-3.0, 3.0, 0.5, 0.5), 0.0);
+        assert_eq!(Truncated::new([-3.0, 3.0]).score(0.5, 0.5), 0.0);
         assert_eq!(between(-f64::INFINITY, f64::INFINITY), 1.0);
     }
 
     #[test]
+    #[expect(clippy::excessive_precision, reason = "digits as the reference gives them")]
     fn truncated_scores_agree_with_forty_digit_values_far_in_a_tail() {
         // Solved with mpmath's findroot at 40 digits for the double-precision arguments.
         for (u, a, b, z) in [
@@ -137,8 +166,8 @@ mod tests {
             (1.0 / 9_007_199_254_740_992.0, -3.0, 3.0, -2.999_999_999_999_975_016_6),
             (0.3, -1.0, 2.0, -0.242_403_817_889_226_826_23),
         ] {
-            let (upper, lower) =
-                (truncated_score(a, b, u, 1.0 - u), truncated_score(-b, -a, 1.0 - u, u));
+            let upper = Truncated::new([a, b]).score(u, 1.0 - u);
+            let lower = Truncated::new([-b, -a]).score(1.0 - u, u);
             assert!((upper / z - 1.0).abs() < 4e-15, "{u} [{a}, {b}]: {upper}");
             assert!((lower / z + 1.0).abs() < 4e-15, "{u} [{a}, {b}]: {lower}");
         }

@@ -394,7 +394,8 @@ fn check_values(
         at("law", format!("values from {low} to {high}"), words.into());
     }
     let Some([low, high]) = row.worst else { return };
-    if !(low <= high) {
+    // Both are finite, as every number that was read.
+    if low > high {
         at("worst", format!("[{low}, {high}]"), "[low, high] in this order".into());
     }
     for (i, value) in [low, high].into_iter().enumerate().filter(|(_, v)| !domain.contains(*v)) {

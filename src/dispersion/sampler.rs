@@ -36,6 +36,11 @@ impl<'a> Sampler<'a> {
         Self { dispersion, plan: Plan::monte_carlo(dispersion, seed) }
     }
 
+    /// The dispersion from which it draws.
+    pub fn dispersion(&self) -> &'a Dispersion {
+        self.dispersion
+    }
+
     /// A cursor with buffers of its own, one a thread.
     pub fn cursor(&self) -> Cursor<'_> {
         let count = self.dispersion.draws().len();

@@ -1,1 +1,22 @@
-//! Gates: statistics against limits, with a verdict.
+//! Gates: rules over the reduced values of the cases of a run, and their verdicts.
+//!
+//! Pure: rules come from text, values from a [`Source`]; reading tables and printing are elsewhere.
+//! The keys are described at [`RawGate`].
+
+mod evaluate;
+mod names;
+mod outcome;
+mod raw;
+mod resolve;
+mod rule;
+mod source;
+mod verdict;
+
+pub use evaluate::evaluate;
+pub use outcome::{Offender, Outcome, Report, report_schema};
+pub use raw::{RawGate, RawGates, RawSeverity, RawStatistic, schema};
+pub use rule::{Gate, Limit, Quantity, Selection, Sense, Statistic, parse};
+pub use source::{
+    CaseValue, Metric, MissingMeans, Population, Query, Source, Table, Worst, reduce,
+};
+pub use verdict::{Severity, Verdict, combine};

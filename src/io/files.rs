@@ -42,6 +42,14 @@ pub fn open(path: &Path) -> Result<File, Problems> {
     File::open(path).map_err(|e| problem(path, &e, "a readable file"))
 }
 
+/// Size of a file, bytes.
+///
+/// # Errors
+/// What the system says of it.
+pub fn size(path: &Path) -> io::Result<u64> {
+    Ok(fs::metadata(path)?.len())
+}
+
 /// BLAKE3 digest of a file's bytes, hexadecimal.
 ///
 /// # Errors
@@ -72,6 +80,42 @@ pub fn create_folder(path: &Path) -> Result<(), Problems> {
         }
         _ => problem(path, &e, "a folder that can be made"),
     })
+}
+
+/// Refuses a name that something has already.
+///
+/// # Errors
+/// One problem if something of that name exists.
+pub fn refuse_existing(path: &Path) -> Result<(), Problems> {
+    if fs::symlink_metadata(path).is_ok() {
+        return Err(Problems::input(name(path), "", "something that exists", "a new name"));
+    }
+    Ok(())
+}
+
+/// Makes the folders above `path` where they are missing.
+///
+/// # Errors
+/// One problem if a folder cannot be made.
+pub fn create_parents(path: &Path) -> Result<(), Problems> {
+    let parent = path.parent().unwrap_or(path);
+    fs::create_dir_all(parent).map_err(|e| problem(parent, &e, "a folder that can be made"))
+}
+
+/// All bytes of a file.
+///
+/// # Errors
+/// One problem if it is missing or unreadable.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Problems> {
+    fs::read(path).map_err(|e| problem(path, &e, "a readable file"))
+}
+
+/// The absolute path of a file that exists, without links.
+///
+/// # Errors
+/// One problem if it is missing.
+pub fn absolute(path: &Path) -> Result<PathBuf, Problems> {
+    path.canonicalize().map_err(|e| problem(path, &e, "a readable file"))
 }
 
 /// Removes a folder if it is empty; anything else stays as it is.

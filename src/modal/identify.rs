@@ -84,6 +84,19 @@ impl Reference {
         Self { pair, left_mass, left_damping, derivative }
     }
 
+    /// Right and left eigenvectors of the state matrix A at the pole: v = [x, s x] with unit x, and
+    /// w with `wᴴ A = s wᴴ`, `wᴴ v = 1` (unscaled where the pole is defective).
+    pub fn state_vectors(&self) -> (Vec<c64>, Vec<c64>) {
+        let (s, right) = (self.pair.pole, &self.pair.right);
+        let states = right.iter().copied().chain(right.iter().map(|x| s * x)).collect();
+        let scale = self.derivative.inv();
+        let scale = if scale.is_finite() { scale } else { c64::new(1.0, 0.0) };
+        // wᴴ = [s yᴴM + yᴴD, yᴴM].
+        let upper = self.left_mass.iter().zip(&self.left_damping).map(|(m, d)| s * m + d);
+        let rows = upper.chain(self.left_mass.iter().copied());
+        (states, rows.map(|w| (w * scale).conj()).collect())
+    }
+
     /// `w₀ᴴ v` for a state-space vector v = [x, s x]: `y₀ᴴ [(s₀ + s) M₀ + D₀] x`.
     fn project(&self, pair: &Pair) -> c64 {
         let sum = self.pair.pole + pair.pole;

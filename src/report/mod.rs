@@ -1,5 +1,13 @@
-//! Reports: from values to text for people.
+//! Reports: values become text for people, terminal tables first.
 
 pub mod actuator;
+pub mod gates;
+pub mod how_many;
 pub mod modes;
+pub mod nominal;
+mod number;
+pub mod plan;
 pub mod scenario;
+pub mod story;
+
+pub use number::{percent, significant};

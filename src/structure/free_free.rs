@@ -71,15 +71,15 @@ pub fn free_free(model: &Weighed, limit: f64, count: usize) -> Result<FreeFree, 
     let mu: Vec<f64> = (0..n).rev().map(|i| eigen.S()[i]).collect();
     // Beyond the rigid ones, eigenvalues at round-off belong to freedoms without mass.
     let floor = n as f64 * f64::EPSILON * mu.first().copied().unwrap_or(0.0);
-    let elastic = n.saturating_sub(6);
-    let kept = (mu.iter().take(elastic.min(count)))
-        .take_while(|&&mu| mu > floor && 1.0 / mu <= limit)
-        .count();
+    let elastic: Vec<f64> =
+        mu.into_iter().take(n.saturating_sub(6)).take_while(|&mu| mu > floor).collect();
+    let kept = elastic.iter().take(count).take_while(|&&mu| 1.0 / mu <= limit).count();
     // A cluster of eigenvalues is oriented as a whole, even where the count cuts through it.
-    let solved = kept + orientation::cut(&mu[kept.saturating_sub(1)..elastic.max(kept)], kept);
-    let mut shapes = Mat::from_fn(n, solved, |i, j| eigen.U()[(i, n - 1 - j)] / mu[j].sqrt());
+    let elastic = &elastic[..orientation::whole(&elastic, kept, n)];
+    let mut shapes =
+        Mat::from_fn(n, elastic.len(), |i, j| eigen.U()[(i, n - 1 - j)] / elastic[j].sqrt());
     solve_upper_triangular_in_place(c.transpose(), shapes.as_mut(), Par::Seq);
-    let mut omega2: Vec<f64> = mu[..solved].iter().map(|mu| 1.0 / mu).collect();
+    let mut omega2: Vec<f64> = elastic.iter().map(|mu| 1.0 / mu).collect();
     for (j, &omega2) in omega2.iter().enumerate() {
         // Strain energy that round-off in K alone could feign.
         let parts: f64 = (0..n).map(|i| k[(i, i)] * shapes[(i, j)].powi(2)).sum();
@@ -87,7 +87,7 @@ pub fn free_free(model: &Weighed, limit: f64, count: usize) -> Result<FreeFree, 
             return Err(mechanism(model, held.as_ref()));
         }
     }
-    orientation::orient(&omega2, &mut shapes, model);
+    orientation::orient(elastic, &mut shapes, model);
     omega2.truncate(kept);
     shapes.truncate(n, kept);
     clear_round_off(&mut shapes, m);

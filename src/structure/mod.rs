@@ -5,6 +5,8 @@
 pub mod assignment;
 pub mod beam;
 pub mod character;
+#[cfg(test)]
+mod closed_forms;
 pub mod free_free;
 pub mod label;
 pub mod orientation;

@@ -3,7 +3,7 @@
 //! Eigenvectors only; how modes at different flight times correspond is found in `label`.
 //!
 //! **Repeated modes.** Consecutive modes whose squared frequencies differ by less than
-//! [`CLUSTER`] (relative) span one subspace; in it any rotation is as good, and a solver returns
+//! [`CLUSTER`] (relative), or by no more than round-off, span one subspace; in it any rotation is as good, and a solver returns
 //! one by chance. The basis is chosen by a fixed list of geometric fields over the body (lateral
 //! y, then z, axial, roll; even, then odd in y and z; waves of growing number along x): the first
 //! mode is the projection onto the subspace of the first field that it answers to at least half
@@ -23,21 +23,25 @@ use nalgebra::Vector3;
 /// a closer pair have lost more than half of their digits to round-off.
 pub const CLUSTER: f64 = 1.490_116_119_384_765_6e-8;
 
-/// How many further modes belong to the cluster of the last one kept. `mu` holds the inverse
-/// squares of the circular frequencies from that mode on.
-pub(super) fn cut(mu: &[f64], kept: usize) -> usize {
-    if kept == 0 {
-        return 0;
-    }
-    mu.windows(2).take_while(|w| w[0] - w[1] <= CLUSTER * w[0]).count()
+/// Whether the mode at `i` and the next are repeated. `mu` are the inverse squares of the circular
+/// frequencies of a model with `n` freedoms, descending, each known to `n ε mu[0]`.
+fn repeated(mu: &[f64], i: usize, n: usize) -> bool {
+    let round_off = n as f64 * f64::EPSILON * mu[0];
+    i + 1 < mu.len() && mu[i] - mu[i + 1] <= CLUSTER * mu[i] + round_off
 }
 
-/// Orients repeated modes and fixes the sign of all.
-pub(super) fn orient(omega2: &[f64], shapes: &mut Mat<f64>, model: &Weighed) {
+/// Number of modes to be oriented so that no cluster among the first `kept` is cut through.
+pub(super) fn whole(mu: &[f64], kept: usize, n: usize) -> usize {
+    let more = (kept..).take_while(|&i| i > 0 && repeated(mu, i - 1, n)).count();
+    kept + more
+}
+
+/// Orients repeated modes and fixes the sign of all; `mu` as in [`repeated`].
+pub(super) fn orient(mu: &[f64], shapes: &mut Mat<f64>, model: &Weighed) {
+    let n = shapes.nrows();
     let mut start = 0;
-    while start < omega2.len() {
-        let more =
-            (omega2[start..].windows(2)).take_while(|w| w[1] - w[0] <= CLUSTER * w[1]).count();
+    while start < mu.len() {
+        let more = (start..).take_while(|&i| repeated(mu, i, n)).count();
         if more > 0 {
             rotate(shapes, start, more + 1, model);
         }
@@ -151,7 +155,7 @@ fn deciding(shapes: &Mat<f64>, j: usize, order: &[usize]) -> f64 {
     let (translations, rotations) = order.split_at(order.len() / 2);
     let greatest = |part: &[usize]| part.iter().map(|&i| shapes[(i, j)].abs()).fold(0.0, f64::max);
     // In pure torsion the translations are round-off beside a rotation over a metre.
-    let still = greatest(translations) <= CLUSTER * greatest(rotations);
+    let still = greatest(translations) <= 1e-6 * greatest(rotations);
     let part = if still { rotations } else { translations };
     let bound = (1.0 - 1e-6) * greatest(part);
     part.iter().map(|&i| shapes[(i, j)]).find(|v| v.abs() >= bound).unwrap_or(0.0)

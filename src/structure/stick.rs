@@ -633,3 +633,113 @@ fn local_axes(along: Vector3<f64>, up: Option<Vector3<f64>>) -> Option<Matrix3<f
     let axes = Matrix3::from_rows(&[x.transpose(), y.transpose(), z.transpose()]);
     axes.iter().all(|v| v.is_finite()).then_some(axes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const REFERENCE: &str = include_str!("../../vehicles/sls-like/stick.toml");
+
+    fn problems_after(change: &[(&str, &str)]) -> String {
+        let mut text = REFERENCE.to_owned();
+        for (from, to) in change {
+            assert!(text.contains(from), "{from}");
+            text = text.replacen(from, to, 1);
+        }
+        Stick::parse(&text, "stick.toml").unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_reference_stick_is_read_and_is_mirror_symmetric() {
+        let stick = Stick::parse(REFERENCE, "stick.toml").unwrap();
+        let named = |name: &str| {
+            let nodes = stick.nodes.iter().map(|n| (&n.name, n.position_m));
+            let points = stick.points.iter().map(|p| (&p.name, p.position_m));
+            nodes.chain(points).find(|(n, _)| *n == name).map(|(_, p)| p)
+        };
+        let grids =
+            (stick.nodes.iter().map(|n| &n.name)).chain(stick.points.iter().map(|p| &p.name));
+        for name in grids.filter(|name| name.contains("left")) {
+            let (left, right) =
+                (named(name).unwrap(), named(&name.replace("left", "right")).unwrap());
+            assert_eq!(left, Vector3::new(right.x, -right.y, right.z), "{name}");
+        }
+        let case = stick.nodes.iter().filter(|n| n.name.starts_with("booster.left.case."));
+        assert!(case.count() > 20);
+    }
+
+    #[test]
+    fn all_problems_of_a_text_are_told_at_once_each_with_its_key() {
+        let told = problems_after(&[
+            ("format = 1", "format = 2"),
+            ("youngs_modulus_pa = 73e9", "youngs_modulus_pa = -73e9"),
+            ("mass_kg = [75000.0]", "mass_kg = [nan]"),
+            ("grid = \"booster.left.aft.01\"", "grid = \"booster.left.oft.01\""),
+            ("name = \"nose\"", "name = \"tank.lox\""),
+            ("time_s = [0, 120]", "time_s = [120, 0]"),
+            ("material = \"steel\"", "material = \"steal\""),
+        ]);
+        for key in [
+            "format: found 2; allowed: 1",
+            "material[0].youngs_modulus_pa: found -73000000000",
+            "beam[0].mass[0].mass_kg: found NaN",
+            "point[0].grid: found `booster.left.oft.01`",
+            "point.name: found `tank.lox`",
+            "beam[0].mass[2].time_s: found [120.0, 0.0]",
+            "beam[1].piece[0].material: found `steal`",
+        ] {
+            assert!(told.contains(key), "{key} is missing in\n{told}");
+        }
+        assert_eq!(told.lines().count(), 7, "{told}");
+    }
+
+    #[test]
+    fn a_misspelt_key_and_a_wrong_type_are_told_with_their_line() {
+        let told = problems_after(&[("elements = 9", "element = 9")]);
+        assert!(told.contains("line ") && told.contains("element"), "{told}");
+        let told = problems_after(&[("elements = 9", "elements = \"nine\"")]);
+        assert!(told.contains("line ") && told.contains("nine"), "{told}");
+    }
+
+    #[test]
+    fn geometry_that_does_not_fit_is_told() {
+        for (from, to, key) in [
+            ("to_station_m = 94.0", "to_station_m = 95.0", "to_station_m: found 95"),
+            ("to_station_m = 50.4", "to_station_m = 30.0", "to_station_m: found 30"),
+            ("end_m = [94.0, 0.0, 0.0]", "end_m = [0.0, 0.0, 0.0]", "two different points"),
+            ("elements = 9", "elements = 0", "elements: found 0"),
+            ("elements = 9", "elements = 99999999999", "at most 1000 elements"),
+            ("thickness_m = 0.012", "thickness_m = 9.0", "at most twice the mean radius"),
+            ("radius_m = 1.2, ", "radius_m = 1.2, area_m2 = 1.0, ", "a mixture of both forms"),
+            ("radius_m = 1.2, ", "", "radius_m: found 0"),
+            ("slosh_kg = 7490.0", "slosh_kg = 749000.0", "at most the least of mass_kg"),
+            ("full_kg = 146700.0", "full_kg = 14670.0", "at least the greatest of mass_kg"),
+            ("from_station_m = 34.3", "from_station_m = 94.3", "increasing, within 0 to 94"),
+            ("mass_kg = [843700.0, 632308.0]", "mass_kg = [843700.0]", "one value, or one for"),
+        ] {
+            let told = problems_after(&[(from, to)]);
+            assert!(told.contains(key), "{key} is missing in\n{told}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_or_refused(text in "[a-z_=.\"0-9\\[\\]\n -]{0,200}") {
+            let _ = Stick::parse(&text, "stick.toml");
+        }
+
+        #[test]
+        fn an_altered_reference_is_read_or_refused(
+            at in 0..1_000_000_usize, length in 0..40_usize, to in "[-a-z_=.\"0-9\\[\\]\n]{0,12}",
+        ) {
+            let from = (at % REFERENCE.len()..).find(|&i| REFERENCE.is_char_boundary(i)).unwrap();
+            let end = (from + length..).find(|&i| i >= REFERENCE.len() || REFERENCE.is_char_boundary(i));
+            let end = end.unwrap().min(REFERENCE.len());
+            let text = format!("{}{to}{}", &REFERENCE[..from], &REFERENCE[end..]);
+            if let Ok(stick) = Stick::parse(&text, "stick.toml") {
+                prop_assert!(stick.elements.len() <= MAX_ELEMENTS);
+            }
+        }
+    }
+}

@@ -74,8 +74,14 @@ fn the_distribution_function_undoes_the_quantile_in_both_tails() {
                 // What one rounding of x either way changes cannot be recovered.
                 let lost = (at(x.next_up()) - at(x.next_down())).abs();
                 let tail = if upper { 1.0 - u } else { u };
+                // Beside its own bound a truncated law is a difference of two values of Φ.
+                let difference = matches!(law.0, Shape::TruncatedNormal { .. });
+                let rounding = if difference { f64::EPSILON } else { 0.0 };
                 let error = (at(x) - tail).abs();
-                assert!(error <= 2e-13 * tail + 2.0 * lost, "{law:?} at {u}: {error:e}");
+                // The logarithm of the beta density is a difference of terms up to 1000 ln 1000.
+                let relative = if matches!(law.0, Shape::Beta { .. }) { 2e-12 } else { 1e-13 };
+                let allowed = relative * tail + 2.0 * lost + rounding;
+                assert!(error <= allowed, "{law:?} at {u}: {error:e}");
             }
         }
     }
@@ -86,7 +92,11 @@ fn the_score_of_a_drawn_value_is_the_score_that_was_drawn() {
     for law in continuous() {
         for z in [-7.5, -3.0, -1.0, 0.0, 0.3, 2.0, 6.0] {
             let x = law.value(&Position::of_score(z));
-            let back = law.score(x).unwrap();
+            // Beside a bound where the density is infinite x may round to the bound itself.
+            let Some(back) = law.score(x) else {
+                assert!(law.range().unwrap().contains(&x), "{law:?} at {z}: {x}");
+                continue;
+            };
             let lost = [x.next_up(), x.next_down()]
                 .map(|x| law.score(x).map_or(f64::INFINITY, |s| (s - back).abs()));
             let tolerance = 1e-12 + 2.0 * lost[0].max(lost[1]);
@@ -126,7 +136,7 @@ fn medians_are_exact() {
 fn closed_forms_hold() {
     let close = |x: f64, y: f64| assert!((x - y).abs() <= 4.0 * f64::EPSILON * y.abs(), "{x} {y}");
     // Exponential tail of Beta(1, 3): F = 1 − (1 − t)³. Arcsine law: t = sin²(π u / 2).
-    close(Law::beta(1.0, 3.0, 0.0, 1.0).unwrap().quantile(0.875), 0.5);
+    assert!((Law::beta(1.0, 3.0, 0.0, 1.0).unwrap().quantile(0.875) / 0.5 - 1.0).abs() < 1e-14);
     let arcsine = Law::beta(0.5, 0.5, 0.0, 1.0).unwrap();
     let t = (std::f64::consts::PI * 0.1).sin().powi(2);
     assert!((arcsine.quantile(0.2) / t - 1.0).abs() < 1e-14);
@@ -135,6 +145,21 @@ fn closed_forms_hold() {
     close(Law::triangular(0.0, 1.0, 1.0).unwrap().quantile(0.25), 0.5);
     close(Law::lognormal(3.0, 0.5).unwrap().value(&Position::of_score(2.0)), 3.0 * 1_f64.exp());
     close(Law::normal(1.0, 0.5).unwrap().value(&Position::of_score(-3.0)), -0.5);
+}
+
+#[test]
+#[expect(clippy::excessive_precision, reason = "digits as the reference gives them")]
+fn beta_probabilities_agree_with_forty_digit_values() {
+    // mpmath `betainc(.., regularized=True)`.
+    for (alpha, beta, t, probability) in [
+        (2.0, 3.0, 0.25, 0.261_718_75),
+        (0.5, 0.5, 0.1, 0.204_832_764_699_133_451_65),
+        (50.0, 30.0, 0.5, 0.011_909_896_429_000_633_401),
+    ] {
+        let law = Law::beta(alpha, beta, 0.0, 1.0).unwrap();
+        assert!((law.cdf(t) / probability - 1.0).abs() < 2e-12, "{}", law.cdf(t));
+        assert!((law.quantile(probability) / t - 1.0).abs() < 2e-12);
+    }
 }
 
 #[test]
@@ -217,7 +242,8 @@ fn draws_follow_the_distribution_functions_of_statrs() {
         assert!(d < ONE_IN_A_MILLION, "{law:?}: {d}");
         for i in 1..1000 {
             let x = law.quantile(f64::from(i) / 1000.0);
-            assert!((law.cdf(x) - other.cdf(x)).abs() < 1e-11, "{law:?} at {x}");
+            // The constants of its erf are given to ten digits.
+            assert!((law.cdf(x) - other.cdf(x)).abs() < 1e-10, "{law:?} at {x}");
         }
     }
     check(Law::normal(-2.0, 3.0).unwrap(), statrs::Normal::new(-2.0, 3.0).unwrap());

@@ -1,0 +1,50 @@
+//! `tvse plan`: the draws of a run, nothing solved.
+
+use super::{Error, PASS};
+use crate::campaign::outline::DrawColumn;
+use crate::campaign::{Outline, StoredPoles};
+use crate::dispersion::Sampler;
+use crate::{io, report};
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Draws of a run: what each draw key yields beside its law, and every draw as Parquet.
+///
+/// Nothing is solved; corners with signs to be evaluated are left out.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  tvse plan runs/reference.toml
+  tvse plan runs/reference.toml --output draws.parquet")]
+pub struct Args {
+    /// The run definition
+    run: PathBuf,
+    /// File for the draws of every case; it must not exist
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// All problems of the run and what it names; an output file that exists or cannot be written.
+pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
+    let loaded = io::scenario::load(&args.run)?;
+    let mut definition = loaded.definition;
+    let open = loaded.corners.iter().flat_map(|c| [c.population, c.population + 1]);
+    let left_out: Vec<String> = open
+        .filter_map(|index| definition.populations.get(index))
+        .map(|p| p.name.clone())
+        .collect();
+    definition.populations.retain(|p| !left_out.contains(&p.name));
+    let sampler = Sampler::new(&loaded.dispersion, definition.seed);
+    let draws = loaded.dispersion.draws();
+    write!(out, "{}", report::plan::table(&definition, draws, &sampler))?;
+    if let Some(path) = &args.output {
+        let columns = draws.iter().map(DrawColumn::of).collect();
+        let outline = Outline::new(definition, StoredPoles::Named, columns, Vec::new());
+        let rows = io::plan::write(path, &outline, &sampler)?;
+        writeln!(out, "{}: {rows} rows", path.display())?;
+    }
+    Ok(PASS)
+}

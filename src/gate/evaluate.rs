@@ -1,0 +1,368 @@
+//! From gates and the values of a run to outcomes.
+//!
+//! Every gate but the extreme comes down to one question: is the share of the population that
+//! breaks a limit at most an allowed share, at the confidence? Of N cases k break it (failed cases
+//! do). It is shown where P(X ≤ k | N, allowed) ≤ risk, its contrary where
+//! P(X ≥ k | N, allowed) ≤ risk, X binomial: the two Clopper–Pearson bounds, and at the same time
+//! the order statistics of Wilks.
+
+use super::outcome::{Offender, Outcome};
+use super::resolve::{Claim, Plan, Run, column_unit, resolve};
+use super::rule::{Gate, Sense, Statistic};
+use super::source::{CaseValue, Metric, MissingMeans, Query, Source, Worst};
+use super::verdict::Verdict;
+use crate::problem::Problems;
+use crate::stats::{self, Probability, Sides, Tails};
+
+/// Evaluates gates read from `file`.
+///
+/// What a run does not have (metric, variant, …), and an exact bound asked of cases that are not
+/// independent draws, are problems of the gate file: all of them are returned, and no outcome.
+pub fn evaluate(
+    gates: &[Gate],
+    source: &impl Source,
+    file: &str,
+) -> Result<Vec<Outcome>, Problems> {
+    let run = Run::of(source);
+    let plans = resolve(gates, &run, file)?;
+    gates.iter().zip(&plans).map(|(gate, plan)| outcome(gate, plan, source)).collect()
+}
+
+/// Side of the metric on which it is bad.
+fn worst(gate: &Gate) -> Worst {
+    match (&gate.statistic, gate.limit.sense) {
+        (Statistic::ShareBelow { .. }, Sense::AtMost)
+        | (Statistic::ShareAbove { .. }, Sense::AtLeast) => Worst::Smallest,
+        (Statistic::ShareBelow { .. }, Sense::AtLeast)
+        | (Statistic::ShareAbove { .. }, Sense::AtMost) => Worst::Largest,
+        (_, Sense::AtLeast) => Worst::Smallest,
+        (_, Sense::AtMost) => Worst::Largest,
+    }
+}
+
+/// Whether a value counts against the gate; written so that NaN does.
+fn violates(gate: &Gate, value: f64) -> bool {
+    let good = match (&gate.statistic, gate.limit.sense) {
+        (Statistic::ShareBelow { threshold, .. }, Sense::AtMost) => value >= threshold.base(),
+        (Statistic::ShareBelow { threshold, .. }, Sense::AtLeast) => value < threshold.base(),
+        (Statistic::ShareAbove { threshold, .. }, Sense::AtMost) => value <= threshold.base(),
+        (Statistic::ShareAbove { threshold, .. }, Sense::AtLeast) => value > threshold.base(),
+        (_, Sense::AtLeast) => value >= gate.limit.quantity.base(),
+        (_, Sense::AtMost) => value <= gate.limit.quantity.base(),
+    };
+    !good
+}
+
+/// The cases of a gate, worst first: failed ones, then by value, then those where none applies.
+struct Cases {
+    ordered: Vec<CaseValue>,
+    failures: u64,
+    violations: u64,
+}
+
+impl Cases {
+    fn of(gate: &Gate, metric: &Metric, mut values: Vec<CaseValue>) -> Self {
+        for case in &mut values {
+            match case.value {
+                Ok(Some(value)) if !value.is_finite() => {
+                    case.value = Err(format!("{} is {value}", metric.name));
+                }
+                Ok(None) if metric.missing == MissingMeans::NoValue => {
+                    case.value = Err(format!("{} has no value", metric.name));
+                }
+                _ => {}
+            }
+        }
+        let sign = if worst(gate) == Worst::Smallest { 1.0 } else { -1.0 };
+        let badness = |case: &CaseValue| match case.value {
+            Err(_) => f64::NEG_INFINITY,
+            Ok(Some(value)) => sign * value,
+            Ok(None) => f64::INFINITY,
+        };
+        // Stable: equal values stay in the order of their cases.
+        values.sort_by(|a, b| badness(a).total_cmp(&badness(b)));
+        let failures = values.iter().filter(|case| case.value.is_err()).count() as u64;
+        let violations = values.iter().filter(|case| offends(gate, case)).count() as u64;
+        Self { ordered: values, failures, violations }
+    }
+
+    fn len(&self) -> u64 {
+        self.ordered.len() as u64
+    }
+
+    /// The value that `skip` cases are worse than; `None` beyond the last and where none stands.
+    fn value_after(&self, skip: u64) -> Option<f64> {
+        let case = self.ordered.get(usize::try_from(skip).ok()?)?;
+        case.value.as_ref().ok().copied().flatten()
+    }
+}
+
+fn offends(gate: &Gate, case: &CaseValue) -> bool {
+    match case.value {
+        Err(_) => true,
+        Ok(Some(value)) => violates(gate, value),
+        Ok(None) => false,
+    }
+}
+
+fn outcome(gate: &Gate, plan: &Plan<'_>, source: &impl Source) -> Result<Outcome, Problems> {
+    let selection = &gate.selection;
+    let values = source.values(&Query {
+        metric: plan.metric,
+        population: &selection.population,
+        variant: selection.variant.as_deref(),
+        baseline: selection.baseline.as_deref(),
+        flight_times_s: selection.flight_times_s.as_deref(),
+        mode: selection.mode.as_deref(),
+        worst: worst(gate),
+    })?;
+    let planned = plan.population.planned;
+    let sound = values.is_sorted_by(|a, b| a.case < b.case)
+        && values.last().is_none_or(|last| last.case < planned);
+    if !sound {
+        return Err(Problems::damage(
+            "cases",
+            &selection.population,
+            "cases out of order, twice, or beyond those planned",
+            format!("each of {planned} cases once, in order"),
+        ));
+    }
+    let missing = planned - values.len() as u64;
+    let cases = Cases::of(gate, plan.metric, values);
+    let verdict = verdict(gate, plan, &cases, missing);
+    Ok(describe(gate, plan, &cases, missing, verdict))
+}
+
+fn verdict(gate: &Gate, plan: &Plan<'_>, cases: &Cases, missing: u64) -> Verdict {
+    // A run in which every case failed shows nothing, good or bad.
+    if cases.failures == cases.len() {
+        return Verdict::Incomplete;
+    }
+    let (passes, fails) = match plan.claim {
+        Claim::Every => (cases.violations == 0, cases.violations > 0),
+        Claim::Share { allowed, confidence, independent } => {
+            let (k, n) = (cases.violations, cases.len());
+            let shown = |test: Result<bool, stats::Error>| test.unwrap_or(false);
+            (
+                shown(stats::rejects_at_least(k, n, allowed, confidence, independent)),
+                shown(stats::rejects_at_most(k, n, allowed, confidence, independent)),
+            )
+        }
+    };
+    if fails {
+        Verdict::Fail
+    } else if missing > 0 {
+        Verdict::Incomplete
+    } else if passes && cases.len() >= gate.min_cases {
+        Verdict::Pass
+    } else {
+        Verdict::Inconclusive
+    }
+}
+
+/// Value and bound in the unit of the limit, and the most violations that would pass.
+fn value_and_bound(
+    gate: &Gate,
+    plan: &Plan<'_>,
+    cases: &Cases,
+) -> (Option<f64>, Option<f64>, Option<u64>) {
+    let scale = gate.limit.quantity.scale();
+    let n = cases.len();
+    let Claim::Share { allowed, confidence, independent } = plan.claim else {
+        let worst = cases.value_after(0).map(|value| value / scale);
+        return (worst, worst, Some(0));
+    };
+    let coverage = Probability::new(1.0 - allowed.get()).ok();
+    let most =
+        coverage.and_then(|coverage| stats::most_exceedances(n, coverage, confidence, Tails::One));
+    if matches!(gate.statistic, Statistic::ShareBelow { .. } | Statistic::ShareAbove { .. }) {
+        let share =
+            stats::clopper_pearson(cases.violations, n, confidence, Sides::Upper, independent).ok();
+        let shown = |share: f64| match gate.limit.sense {
+            Sense::AtMost => share / scale,
+            Sense::AtLeast => (1.0 - share) / scale,
+        };
+        (share.map(|share| shown(share.point())), share.map(|share| shown(share.upper())), most)
+    } else {
+        // The sample's own order statistic, that the allowed share of the cases is worse than.
+        let skip = (allowed.get() * n as f64).floor() as u64;
+        let value = cases.value_after(skip).map(|value| value / scale);
+        let bound = most.and_then(|most| cases.value_after(most)).map(|value| value / scale);
+        (value, bound, most)
+    }
+}
+
+fn describe(
+    gate: &Gate,
+    plan: &Plan<'_>,
+    cases: &Cases,
+    missing: u64,
+    verdict: Verdict,
+) -> Outcome {
+    let (value, bound, most_violations) = value_and_bound(gate, plan, cases);
+    let needed = Needed::of(gate, plan, cases);
+    let worst = cases.ordered.iter().find(|case| matches!(case.value, Ok(Some(_))));
+    let offenders = cases
+        .ordered
+        .iter()
+        .filter(|case| offends(gate, case))
+        .take(Outcome::OFFENDERS)
+        .map(|case| Offender {
+            case: case.case,
+            value: case.value.as_ref().ok().copied().flatten(),
+            failure: case.value.as_ref().err().cloned(),
+        })
+        .collect();
+    let inconclusive = verdict == Verdict::Inconclusive;
+    let confidence = match plan.claim {
+        Claim::Every => None,
+        Claim::Share { confidence, .. } => Some(confidence.get()),
+    };
+    Outcome {
+        id: gate.id.clone(),
+        verdict,
+        severity: gate.severity,
+        statistic: statistic_in_words(gate),
+        value,
+        bound,
+        sense: match gate.limit.sense {
+            Sense::AtLeast => "at_least",
+            Sense::AtMost => "at_most",
+        },
+        limit: gate.limit.quantity.value,
+        unit: gate.limit.quantity.unit.clone(),
+        confidence,
+        cases: cases.len(),
+        failures: cases.failures,
+        missing,
+        violations: cases.violations,
+        most_violations,
+        worst_case: worst.map(|case| case.case),
+        worst_value: worst.and_then(|case| case.value.as_ref().ok().copied().flatten()),
+        metric_unit: column_unit(&plan.metric.unit),
+        cases_needed: needed.if_good.filter(|_| inconclusive),
+        cases_needed_at_observed_rate: needed.at_rate.filter(|_| inconclusive),
+        offenders,
+        message: message(gate, cases, missing, verdict, &needed),
+        rationale: gate.rationale.clone(),
+    }
+}
+
+/// Further cases needed for a pass.
+struct Needed {
+    /// If none of them is a violation.
+    if_good: Option<u64>,
+    /// If violations go on at the observed rate.
+    at_rate: Option<u64>,
+}
+
+impl Needed {
+    fn of(gate: &Gate, plan: &Plan<'_>, cases: &Cases) -> Self {
+        let (k, n) = (cases.violations, cases.len());
+        let further = |total: u64| total.max(gate.min_cases).saturating_sub(n);
+        let Claim::Share { allowed, confidence, .. } = plan.claim else {
+            let needed = (k == 0).then(|| further(n));
+            return Self { if_good: needed, at_rate: needed };
+        };
+        let Ok(coverage) = Probability::new(1.0 - allowed.get()) else {
+            return Self { if_good: None, at_rate: None };
+        };
+        let least = |k: u64| stats::least_cases(k, coverage, confidence, Tails::One).ok();
+        Self { if_good: least(k).map(further), at_rate: at_observed_rate(k, n, least).map(further) }
+    }
+}
+
+/// Violations looked at before a pass at the observed rate counts as out of reach.
+const MOST_VIOLATIONS: u64 = 1 << 24;
+
+/// Total cases at which the violations expected at the observed rate are few enough.
+fn at_observed_rate(k: u64, n: u64, least: impl Fn(u64) -> Option<u64>) -> Option<u64> {
+    let rate = k as f64 / n as f64;
+    // With v violations allowed from `least(v)` cases on, that many cases show `rate · least(v)`.
+    let enough = |v: u64| least(v).is_some_and(|cases| rate * cases as f64 <= v as f64);
+    let mut low = k;
+    if enough(low) {
+        return least(low);
+    }
+    let mut high = low.max(1);
+    while !enough(high) {
+        low = high;
+        high *= 2;
+        if high > MOST_VIOLATIONS {
+            return None;
+        }
+    }
+    while high - low > 1 {
+        let middle = low + (high - low) / 2;
+        if enough(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    least(high)
+}
+
+/// "minimum of time_to_double_s [jet_damping]", "share of … below 0", with the flight times chosen.
+fn statistic_in_words(gate: &Gate) -> String {
+    let selection = &gate.selection;
+    let mut of = gate.metric.clone();
+    if let Some(variant) = &selection.variant {
+        let baseline = selection.baseline.as_ref().map(|name| format!(" − {name}"));
+        of += &format!(" [{variant}{}]", baseline.unwrap_or_default());
+    }
+    let words = match &gate.statistic {
+        Statistic::Extreme if gate.limit.sense == Sense::AtLeast => format!("minimum of {of}"),
+        Statistic::Extreme => format!("maximum of {of}"),
+        Statistic::ShareBelow { threshold, .. } => format!("share of {of} below {threshold}"),
+        Statistic::ShareAbove { threshold, .. } => format!("share of {of} above {threshold}"),
+        Statistic::Quantile { level, .. } => format!("{} quantile of {of}", level.get()),
+        Statistic::ToleranceBound { coverage, .. } => {
+            format!("bound of {of} kept by {} of the population", coverage.get())
+        }
+    };
+    match &selection.flight_times_s {
+        None => words,
+        Some(times) => {
+            let times = times.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+            format!("{words} at {times} s")
+        }
+    }
+}
+
+fn message(gate: &Gate, cases: &Cases, missing: u64, verdict: Verdict, needed: &Needed) -> String {
+    let mut text = format!("{} of {} cases count against the gate", cases.violations, cases.len());
+    if cases.failures > 0 {
+        text += &format!(", {} of them because they failed", cases.failures);
+    }
+    match verdict {
+        Verdict::Pass | Verdict::Fail => {}
+        Verdict::Incomplete if cases.len() == 0 => text = "no case is present".into(),
+        Verdict::Incomplete if cases.failures == cases.len() => {
+            text = format!("every one of {} cases failed", cases.len());
+        }
+        Verdict::Incomplete => {}
+        Verdict::Inconclusive => {
+            let count = |number: Option<u64>| {
+                number.map_or("no number of".to_string(), |number| number.to_string())
+            };
+            text += &format!("; a pass needs {} more cases", count(needed.if_good));
+            if cases.violations > 0 {
+                text += &format!(
+                    " if all of them are good, {} at the observed rate",
+                    count(needed.at_rate)
+                );
+            }
+            if cases.len() < gate.min_cases {
+                text += &format!(" (at least {} in all)", gate.min_cases);
+            }
+        }
+    }
+    if missing > 0 {
+        text += &format!("; {missing} planned cases are missing");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests;

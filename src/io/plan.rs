@@ -1,0 +1,52 @@
+//! The draws of a run as a Parquet file of their own.
+
+use super::files::{self, Aside};
+use super::table::{self, Table};
+use super::{results, schema};
+use crate::campaign::metric::ReducedCase;
+use crate::campaign::row::CaseRow;
+use crate::campaign::{Outline, Record};
+use crate::dispersion::Sampler;
+use crate::problem::Problems;
+use std::path::Path;
+
+/// Writes the draws of every case of the outline's populations; gives the number of rows.
+///
+/// # Errors
+/// An input problem if the file exists or cannot be written.
+pub fn write(path: &Path, outline: &Outline, sampler: &Sampler<'_>) -> Result<u64, Problems> {
+    files::refuse_existing(path)?;
+    let text = serde_json::to_string(outline).expect("an outline has text keys only");
+    let failed = |error| table::problem(path, &error);
+    let metadata = results::metadata(schema::TableName::Cases, &text);
+    let columns = schema::plan(outline);
+    let mut table = Table::new(columns, &metadata, Aside::beside(path)?).map_err(failed)?;
+    let mut cursor = sampler.cursor();
+    for (index, population) in outline.definition.populations.iter().enumerate() {
+        for case in 0..population.cases {
+            let draws = cursor.draw(case, &population.fixed, population.drawn);
+            let record = Record {
+                population: index,
+                case,
+                values: draws.values.clone(),
+                scores: draws.scores.clone(),
+                evaluations: Vec::new(),
+            };
+            table.push(&CaseRow {
+                population: index,
+                case,
+                reduced: ReducedCase::new(&outline.definition, &record),
+                values: record.values,
+                scores: record.scores,
+                failure: None,
+            });
+            if (case + 1) % schema::TableName::Cases.group_cases(outline) == 0 {
+                table.end_group().map_err(failed)?;
+            }
+        }
+        table.end_group().map_err(failed)?;
+    }
+    let (aside, content) = table.close().map_err(failed)?;
+    aside.finish()?;
+    Ok(content.rows)
+}
