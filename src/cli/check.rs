@@ -22,7 +22,8 @@ pub struct Args {
 /// All problems of the run file and of what it names.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let loaded = io::scenario::load(&args.run)?;
-    let corners: Vec<usize> = loaded.corners.iter().map(|c| c.population).collect();
+    let corners: Vec<usize> =
+        loaded.corners.iter().flat_map(|c| c.populations(&loaded.definition.populations)).collect();
     write!(
         out,
         "{}",

@@ -26,6 +26,16 @@ pub struct Corner {
     pub variant: usize,
 }
 
+impl Corner {
+    /// Indices of the populations whose fixed values are still to be evaluated: the fixed case, and
+    /// the Monte Carlo around it if there is one.
+    pub fn populations<'a>(&'a self, all: &'a [Population]) -> impl Iterator<Item = usize> + 'a {
+        let around = around(&self.name);
+        let follows = move |i: &usize| all.get(*i).is_some_and(|p| p.name == around);
+        std::iter::once(self.population).chain(Some(self.population + 1).filter(follows))
+    }
+}
+
 /// A validated run: its definition, and the corners whose signs are still to be evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {

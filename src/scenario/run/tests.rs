@@ -57,6 +57,7 @@ fn the_reference_run_holds_what_the_reference_vehicle_page_asks_for() {
     ];
     assert_eq!(populations, expected);
     assert_eq!((corners[0].population, corners[0].mode, corners[0].variant), (2, 0, 3));
+    assert!(corners[0].populations(&definition.populations).eq([2, 3]));
     let fixed =
         |part: &str| corners[0].draws.iter().any(|i| dispersion.draws()[*i].key.contains(part));
     assert!(fixed(".damping") && fixed("nozzle.ablation") && fixed("booster.*.thrust @ vehicle"));
