@@ -1,1 +1,3 @@
 //! Input and output: the only module that touches the disk.
+
+pub mod files;

@@ -1,0 +1,255 @@
+//! Files: whole texts read, files written aside, synced and renamed, new folders.
+//!
+//! What the files hold is decided by their callers. Nothing here leaves a half-written file under
+//! a final name: a file appears complete or not at all.
+
+#![expect(clippy::disallowed_methods, reason = "the place where the program touches the disk")]
+
+use crate::problem::Problems;
+use std::fs::{self, File};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// The largest text file that is read, bytes; hand-written scenarios are thousandths of it.
+const LARGEST_TEXT: u64 = 64 << 20;
+/// Bytes written and taken back when a file is opened, so that a full disk is found at once.
+const PROBE: usize = 64 << 10;
+
+/// The whole text of a file.
+///
+/// # Errors
+/// One problem if the file is missing, unreadable, not UTF-8 or larger than 64 MiB.
+pub fn read_text(path: &Path) -> Result<String, Problems> {
+    let allowed = "a readable text file";
+    let file = File::open(path).map_err(|e| problem(path, &e, allowed))?;
+    let bytes = file.metadata().map_err(|e| problem(path, &e, allowed))?.len();
+    if bytes > LARGEST_TEXT {
+        let found = format!("{bytes} bytes");
+        return Err(Problems::input(name(path), "", found, "at most 64 MiB of text"));
+    }
+    let mut text = String::new();
+    // The length may change between the two calls; what is read stays bounded.
+    file.take(LARGEST_TEXT).read_to_string(&mut text).map_err(|e| problem(path, &e, allowed))?;
+    Ok(text)
+}
+
+/// A file opened for reading.
+///
+/// # Errors
+/// One problem if it is missing or unreadable.
+pub fn open(path: &Path) -> Result<File, Problems> {
+    File::open(path).map_err(|e| problem(path, &e, "a readable file"))
+}
+
+/// BLAKE3 digest of a file's bytes, hexadecimal.
+///
+/// # Errors
+/// One problem if it is missing or unreadable.
+pub fn digest(path: &Path) -> Result<String, Problems> {
+    let mut file = open(path)?;
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(&mut file).map_err(|e| problem(path, &e, "a readable file"))?;
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
+/// BLAKE3 digest of bytes, hexadecimal.
+pub fn digest_of(bytes: &[u8]) -> String {
+    blake3::hash(bytes).to_hex().to_string()
+}
+
+/// Makes a new folder, with its parents; refuses one that exists.
+///
+/// # Errors
+/// One problem if something of that name exists or the folder cannot be made.
+pub fn create_folder(path: &Path) -> Result<(), Problems> {
+    if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
+        fs::create_dir_all(parent).map_err(|e| problem(parent, &e, "a writable folder"))?;
+    }
+    fs::create_dir(path).map_err(|e| match e.kind() {
+        io::ErrorKind::AlreadyExists => {
+            Problems::input(name(path), "", "something that exists", "the name of a new folder")
+        }
+        _ => problem(path, &e, "a folder that can be made"),
+    })
+}
+
+/// Removes a folder if it is empty; anything else stays as it is.
+pub fn remove_if_empty(path: &Path) {
+    // A folder that is not empty or already gone is no error of this call.
+    let _ = fs::remove_dir(path);
+}
+
+/// A file being written aside; it takes its final name in [`Aside::finish`] and vanishes if dropped.
+#[derive(Debug)]
+pub struct Aside {
+    file: NamedTempFile,
+    target: PathBuf,
+}
+
+impl Aside {
+    /// Opens a file that will be called `target`, written beside it.
+    ///
+    /// # Errors
+    /// One problem if the folder is missing, not writable or full.
+    pub fn beside(target: &Path) -> Result<Self, Problems> {
+        let folder = match target.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        Self::within(folder, target)
+    }
+
+    /// Opens a file that will be called `target`, written in `folder` of the same file system;
+    /// so a folder of tables never holds anything else than tables.
+    ///
+    /// # Errors
+    /// One problem if the folder is missing, not writable or full.
+    pub fn within(folder: &Path, target: &Path) -> Result<Self, Problems> {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".aside-");
+        #[cfg(unix)]
+        {
+            // The usual rights of a new file, less the user's mask, not those of a secret.
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(fs::Permissions::from_mode(0o666));
+        }
+        let mut file = builder.tempfile_in(folder).map_err(|e| write_problem(target, &e))?;
+        probe(file.as_file_mut()).map_err(|e| write_problem(target, &e))?;
+        Ok(Self { file, target: target.to_owned() })
+    }
+
+    /// The final name.
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
+    /// Syncs the file to the disk and gives it its final name, replacing a file of that name.
+    ///
+    /// # Errors
+    /// One problem if the disk is full or the file cannot be renamed; nothing is left behind.
+    pub fn finish(self) -> Result<(), Problems> {
+        let Self { file, target } = self;
+        file.as_file().sync_all().map_err(|e| write_problem(&target, &e))?;
+        file.persist(&target).map_err(|e| write_problem(&target, &e.error))?;
+        // The rename itself is durable once the folder is synced; where folders cannot be
+        // opened (not on Unix) the system decides.
+        #[cfg(unix)]
+        if let Some(parent) = target.parent() {
+            let folder = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
+            File::open(folder)
+                .and_then(|f| f.sync_all())
+                .map_err(|e| write_problem(&target, &e))?;
+        }
+        Ok(())
+    }
+}
+
+impl Write for Aside {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.as_file_mut().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.as_file_mut().flush()
+    }
+}
+
+/// Writes a whole file aside, syncs and renames it.
+///
+/// # Errors
+/// One problem if the folder is missing, not writable or full; an older file of that name stays.
+pub fn write(target: &Path, bytes: &[u8]) -> Result<(), Problems> {
+    let mut aside = Aside::beside(target)?;
+    aside.write_all(bytes).map_err(|e| write_problem(target, &e))?;
+    aside.finish()
+}
+
+/// The problem of a file that could not be written.
+pub fn write_problem(target: &Path, error: &io::Error) -> Problems {
+    problem(target, error, "a writable folder on a disk with free space")
+}
+
+/// A path as the user reads it.
+pub fn name(path: &Path) -> String {
+    path.display().to_string()
+}
+
+fn problem(path: &Path, error: &io::Error, allowed: &str) -> Problems {
+    Problems::input(name(path), "", error.to_string(), allowed)
+}
+
+fn probe(file: &mut File) -> io::Result<()> {
+    file.write_all(&[0; PROBE])?;
+    file.sync_all()?;
+    file.set_len(0)?;
+    file.seek(SeekFrom::Start(0)).map(|_| ())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_appears_only_when_it_is_finished() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("a.txt");
+        let mut aside = Aside::beside(&target).unwrap();
+        aside.write_all(b"whole").unwrap();
+        assert!(!target.exists());
+        aside.finish().unwrap();
+        assert_eq!(read_text(&target).unwrap(), "whole");
+        assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn a_dropped_file_leaves_nothing_and_the_older_file_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("a.txt");
+        write(&target, b"old").unwrap();
+        let mut aside = Aside::beside(&target).unwrap();
+        aside.write_all(b"half").unwrap();
+        drop(aside);
+        assert_eq!(read_text(&target).unwrap(), "old");
+        assert_eq!(names(folder.path()), ["a.txt"]);
+    }
+
+    #[test]
+    fn a_folder_that_exists_is_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("runs/first");
+        create_folder(&path).unwrap();
+        let problems = create_folder(&path).unwrap_err();
+        assert_eq!(problems.kind(), crate::problem::Kind::Input);
+        assert!(problems.to_string().contains("first: found something that exists"));
+    }
+
+    #[test]
+    fn a_missing_folder_and_a_text_that_is_not_utf8_are_problems_of_their_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("none/a.txt");
+        assert!(Aside::beside(&missing).unwrap_err().to_string().contains("none/a.txt"));
+        let binary = folder.path().join("b.toml");
+        write(&binary, &[0xff, 0xfe]).unwrap();
+        assert!(read_text(&binary).unwrap_err().to_string().contains("UTF-8"));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_is_found_when_the_file_is_opened() {
+        let full = Path::new("/dev/full");
+        let mut file = fs::OpenOptions::new().write(true).open(full).unwrap();
+        let error = probe(&mut file).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::StorageFull);
+        assert!(write_problem(full, &error).to_string().contains("free space"));
+    }
+}
