@@ -2,8 +2,11 @@
 
 pub use crate::dynamics::NozzleJet;
 
+use serde::{Deserialize, Serialize};
+
 /// Where the gimbal slope comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Slope {
     /// Improved Virtual Grid, equations (15) to (22).
     VirtualGrid,
@@ -12,7 +15,7 @@ pub enum Slope {
 }
 
 /// One way to evaluate a draw; all variants of a run share the draws, so that differences are paired.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Variant {
     /// Name, `[a-z0-9_]+`.
     pub name: String,
@@ -29,7 +32,7 @@ pub struct Variant {
 }
 
 /// A set of cases evaluated in one run; tables hold populations in this order.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Population {
     /// Name, `[a-z0-9_]+`: `nominal`, `dispersed`, a corner's name, or that name and `_dispersed`.
     pub name: String,
@@ -42,7 +45,7 @@ pub struct Population {
 }
 
 /// A run definition, validated against its vehicle and dispersion.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Definition {
     /// Name of the run; default folder of the results.
     pub name: String,

@@ -1,8 +1,15 @@
 //! A campaign: cases evaluated in a parallel pool, their records and what they sum up to.
 
 pub mod definition;
+pub mod metric;
+pub mod outline;
 pub mod plant;
+pub mod pool;
 pub mod record;
+#[cfg(test)]
+pub mod synthetic;
 
 pub use definition::{Definition, NozzleJet, Population, Slope, Variant};
+pub use outline::{Draw, Input, Outline, StoredPoles};
+pub use pool::{Pool, Progress, Span};
 pub use record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};

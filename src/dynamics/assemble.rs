@@ -8,7 +8,8 @@ use super::{Layout, Model};
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 
 /// How the nozzle flow enters as jet damping.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum NozzleJet {
     /// No nozzle jet damping.
     Off,

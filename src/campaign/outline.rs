@@ -1,0 +1,90 @@
+//! The outline of a run: all that its tables depend on and that a reader needs to understand them.
+//!
+//! No clock, host or thread count: two runs of one outline give the same bytes.
+
+use super::definition::Definition;
+use serde::{Deserialize, Serialize};
+
+/// Which poles the `modes` table holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StoredPoles {
+    /// The poles of the named modes.
+    Named,
+    /// Every pole of every evaluation.
+    All,
+}
+
+/// One draw key, described for a reader of the tables.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Draw {
+    /// Draw key, `instance path @ level # id`.
+    pub key: String,
+    /// Column of the drawn value in the `cases` table, `draw_…`.
+    pub column: String,
+    /// Unit of the drawn value.
+    pub unit: String,
+    /// What is drawn, by which law.
+    pub description: String,
+    /// Lower and upper end of a bounded law, in the unit of the value.
+    pub range: Option<[f64; 2]>,
+}
+
+impl Draw {
+    /// Column of the normal score in the `cases` table: `score_…`.
+    pub fn score_column(&self) -> String {
+        format!("score_{}", self.column.strip_prefix("draw_").unwrap_or(&self.column))
+    }
+
+    /// Position of `value` in the range of a bounded law: 0 at the low, 1 at the high end.
+    pub fn fraction_of_range(&self, value: f64) -> Option<f64> {
+        self.range.map(|[low, high]| (value - low) / (high - low))
+    }
+
+    /// Whether `value` lies beyond the range of a bounded law, as a point of an adverse corner may.
+    pub fn outside_law(&self, value: f64) -> bool {
+        self.range.is_some_and(|[low, high]| value < low || value > high)
+    }
+}
+
+/// One input text or data file of the run, told by its content.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Input {
+    /// Name of the input, for instance `dispersion`.
+    pub name: String,
+    /// BLAKE3 digest of its bytes, hexadecimal.
+    pub blake3: String,
+}
+
+/// All that the tables of a run depend on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Outline {
+    /// Version of the program.
+    pub program: String,
+    /// The run definition.
+    pub definition: Definition,
+    /// Poles stored.
+    pub poles: StoredPoles,
+    /// Draw keys in the order of the dispersion.
+    pub draws: Vec<Draw>,
+    /// Digests of the inputs.
+    pub inputs: Vec<Input>,
+}
+
+impl Outline {
+    /// The outline of a run by this version of the program.
+    pub fn new(
+        definition: Definition,
+        poles: StoredPoles,
+        draws: Vec<Draw>,
+        inputs: Vec<Input>,
+    ) -> Self {
+        let program = env!("CARGO_PKG_VERSION").to_owned();
+        Self { program, definition, poles, draws, inputs }
+    }
+
+    /// Number of cases of all populations.
+    pub fn cases(&self) -> u64 {
+        self.definition.populations.iter().map(|p| p.cases).sum()
+    }
+}

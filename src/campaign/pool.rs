@@ -1,0 +1,338 @@
+//! The parallel pool: evaluates cases on all threads and hands their records over in order.
+//!
+//! What a case is and where its record goes is decided by the caller; nothing here depends on the
+//! number of threads but the time it takes.
+
+use super::definition::{Definition, Population};
+use super::record::{Evaluation, Failure, FailureKind, Record};
+use std::any::Any;
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+
+/// Cases handed to a thread at once: few, so that the last ones are shared out evenly.
+const BLOCK: usize = 4;
+/// Blocks in flight for each thread; they bound the memory and let the threads work on while
+/// records are written.
+const BLOCKS_PER_THREAD: usize = 8;
+
+/// Consecutive cases of one population.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Span {
+    /// Index of the population.
+    pub population: usize,
+    /// Case indices.
+    pub cases: Range<u64>,
+}
+
+/// Every case of every population, in canonical order.
+pub fn spans(populations: &[Population]) -> Vec<Span> {
+    let all = populations.iter().enumerate();
+    all.map(|(population, p)| Span { population, cases: 0..p.cases }).collect()
+}
+
+/// How far a run has come; counts of cases.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Progress {
+    /// Cases asked for.
+    pub total: u64,
+    /// Cases handed over.
+    pub done: u64,
+    /// Of these, cases with a failed evaluation.
+    pub failed: u64,
+    /// Of these, cases with a named mode that is unstable in some evaluation.
+    pub unstable: u64,
+}
+
+/// A pool of threads for cases.
+#[derive(Debug)]
+pub struct Pool {
+    threads: rayon::ThreadPool,
+}
+
+impl Pool {
+    /// A pool of `jobs` threads, at least one.
+    ///
+    /// # Errors
+    /// The system's message if it gives no threads.
+    pub fn new(jobs: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
+        let threads = rayon::ThreadPoolBuilder::new()
+            .num_threads(jobs.max(1))
+            .thread_name(|index| format!("case-{index}"))
+            .build()?;
+        Ok(Self { threads })
+    }
+
+    /// Evaluates every case of `spans` and hands the records to `sink` in the order of `spans`.
+    ///
+    /// `evaluate` gets the population's index and the case index. A case that panics becomes a
+    /// record without draws whose evaluations all failed. `progress` is called after each record.
+    /// Once `stop` is set no case is begun; the cases begun are still handed over, and the counts
+    /// returned tell how far the run came. Memory holds a bounded number of records.
+    ///
+    /// # Errors
+    /// The first error of `sink`, after which no record is handed over.
+    pub fn run<E>(
+        &self,
+        definition: &Definition,
+        spans: &[Span],
+        evaluate: impl Fn(usize, u64) -> Record + Sync,
+        mut sink: impl FnMut(Record) -> Result<(), E>,
+        mut progress: impl FnMut(&Progress),
+        stop: &AtomicBool,
+    ) -> Result<Progress, E> {
+        let total = spans.iter().map(|s| s.cases.end.saturating_sub(s.cases.start)).sum();
+        let mut counts = Progress { total, ..Progress::default() };
+        let mut blocks = spans.iter().flat_map(blocks);
+        let window = BLOCKS_PER_THREAD * self.threads.current_num_threads();
+        let abandoned = &AtomicBool::new(false);
+        let evaluate = &evaluate;
+        let (sender, receiver) = mpsc::channel();
+        self.threads.in_place_scope(|scope| {
+            // Blocks handed out and not yet handed over, the oldest first.
+            let mut waiting: VecDeque<Option<Vec<Record>>> = VecDeque::with_capacity(window);
+            let mut oldest = 0;
+            loop {
+                while waiting.len() < window && !stop.load(Ordering::Relaxed) {
+                    let Some(block) = blocks.next() else { break };
+                    let index = oldest + waiting.len();
+                    waiting.push_back(None);
+                    let sender = sender.clone();
+                    scope.spawn(move |_| {
+                        let mut records = Vec::new();
+                        if !abandoned.load(Ordering::Relaxed) {
+                            let case = |case| guarded(definition, block.population, case, evaluate);
+                            records.extend(block.cases.map(case));
+                        }
+                        // The receiver is gone only after an error, when nobody wants the block.
+                        let _ = sender.send((index, records));
+                    });
+                }
+                let Some(front) = waiting.front_mut() else { return Ok(counts) };
+                let Some(records) = front.take() else {
+                    let (index, records) = receiver.recv().expect("this end holds a sender");
+                    waiting[index - oldest] = Some(records);
+                    continue;
+                };
+                for record in records {
+                    counts.done += 1;
+                    counts.failed += u64::from(record.failure().is_some());
+                    counts.unstable += u64::from(unstable(&record));
+                    if let Err(error) = sink(record) {
+                        abandoned.store(true, Ordering::Relaxed);
+                        return Err(error);
+                    }
+                    progress(&counts);
+                }
+                waiting.pop_front();
+                oldest += 1;
+            }
+        })
+    }
+}
+
+fn blocks(span: &Span) -> impl Iterator<Item = Span> {
+    let (population, end) = (span.population, span.cases.end);
+    span.cases
+        .clone()
+        .step_by(BLOCK)
+        .map(move |start| Span { population, cases: start..end.min(start + BLOCK as u64) })
+}
+
+/// The record of a case, whatever happens inside it.
+fn guarded(
+    definition: &Definition,
+    population: usize,
+    case: u64,
+    evaluate: &impl Fn(usize, u64) -> Record,
+) -> Record {
+    catch_unwind(AssertUnwindSafe(|| evaluate(population, case))).unwrap_or_else(|payload| {
+        let failure = Failure::new(FailureKind::Panic, message(payload.as_ref()));
+        let evaluations = (0..definition.flight_times_s.len()).flat_map(|flight_time| {
+            let outcome: Result<_, Failure> = Err(failure.clone());
+            (0..definition.variants.len()).map(move |variant| Evaluation {
+                variant,
+                flight_time,
+                outcome: outcome.clone(),
+            })
+        });
+        Record {
+            population,
+            case,
+            values: Vec::new(),
+            scores: Vec::new(),
+            evaluations: evaluations.collect(),
+        }
+    })
+}
+
+fn message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+    text.unwrap_or("a panic without a message").to_owned()
+}
+
+fn unstable(record: &Record) -> bool {
+    let poles = record.evaluations.iter().filter_map(|e| e.outcome.as_ref().ok()).flatten();
+    poles.into_iter().any(|pole| pole.mode.is_some() && pole.value.re > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic;
+    use super::*;
+    use std::sync::atomic::AtomicUsize;
+    use std::time::Duration;
+
+    fn records(jobs: usize) -> (Vec<Record>, Progress) {
+        let definition = synthetic::definition(&[1, 50, 30]);
+        let mut records = Vec::new();
+        let progress = Pool::new(jobs)
+            .unwrap()
+            .run(
+                &definition,
+                &spans(&definition.populations),
+                |population, case| {
+                    // Threads overtake each other.
+                    std::thread::sleep(Duration::from_micros(case % 7 * 50));
+                    synthetic::record(&definition, population, case)
+                },
+                |record| {
+                    records.push(record);
+                    Ok::<(), ()>(())
+                },
+                |_| (),
+                &AtomicBool::new(false),
+            )
+            .unwrap();
+        (records, progress)
+    }
+
+    #[test]
+    fn records_come_in_order_whatever_the_number_of_threads() {
+        let (one, progress) = records(1);
+        let order: Vec<_> = one.iter().map(|r| (r.population, r.case)).collect();
+        assert!(order.is_sorted() && order.len() == 81);
+        assert_eq!((progress.total, progress.done), (81, 81));
+        for jobs in [2, 7] {
+            assert_eq!(records(jobs), (one.clone(), progress));
+        }
+    }
+
+    #[test]
+    fn failed_and_unstable_cases_are_counted() {
+        let (all, progress) = records(2);
+        assert_eq!(progress.failed as usize, all.iter().filter(|r| r.failure().is_some()).count());
+        assert_eq!(progress.unstable as usize, all.iter().filter(|r| unstable(r)).count());
+        assert!(progress.failed > 0 && progress.unstable > 0);
+    }
+
+    #[test]
+    fn a_case_that_panics_is_a_record_in_which_every_evaluation_failed() {
+        let definition = synthetic::definition(&[9]);
+        let mut failed = Vec::new();
+        Pool::new(2)
+            .unwrap()
+            .run(
+                &definition,
+                &spans(&definition.populations),
+                |population, case| {
+                    assert!(case != 5, "case {case} broke");
+                    synthetic::record(&definition, population, case)
+                },
+                |record| {
+                    failed.extend((record.case == 5).then_some(record));
+                    Ok::<(), ()>(())
+                },
+                |_| (),
+                &AtomicBool::new(false),
+            )
+            .unwrap();
+        let [record] = &failed[..] else { panic!("one record of case 5") };
+        assert_eq!(
+            record.evaluations.len(),
+            definition.flight_times_s.len() * definition.variants.len()
+        );
+        for evaluation in &record.evaluations {
+            let failure = evaluation.outcome.as_ref().unwrap_err();
+            assert_eq!(failure, &Failure::new(FailureKind::Panic, "case 5 broke"));
+        }
+    }
+
+    #[test]
+    fn a_sink_that_fails_ends_the_run_with_its_error() {
+        let definition = synthetic::definition(&[100_000]);
+        let mut handed = 0;
+        let result = Pool::new(2).unwrap().run(
+            &definition,
+            &spans(&definition.populations),
+            |population, case| synthetic::record(&definition, population, case),
+            |_| {
+                handed += 1;
+                if handed == 10 { Err("disk full") } else { Ok(()) }
+            },
+            |_| (),
+            &AtomicBool::new(false),
+        );
+        assert_eq!(result, Err("disk full"));
+        assert_eq!(handed, 10);
+    }
+
+    #[test]
+    fn a_stop_hands_over_the_cases_begun_without_a_gap() {
+        let definition = synthetic::definition(&[100_000]);
+        let stop = AtomicBool::new(false);
+        let mut next = 0;
+        let progress = Pool::new(2)
+            .unwrap()
+            .run(
+                &definition,
+                &spans(&definition.populations),
+                |population, case| synthetic::record(&definition, population, case),
+                |record| {
+                    assert_eq!(record.case, next);
+                    next += 1;
+                    stop.store(next >= 20, Ordering::Relaxed);
+                    Ok::<(), ()>(())
+                },
+                |_| (),
+                &stop,
+            )
+            .unwrap();
+        assert_eq!(progress.done, next);
+        let in_flight = (BLOCK * BLOCKS_PER_THREAD * 2) as u64;
+        assert!((20..20 + 2 * in_flight).contains(&progress.done));
+    }
+
+    #[test]
+    fn a_slow_sink_holds_back_the_evaluation_so_that_memory_is_bounded() {
+        let definition = synthetic::definition(&[400]);
+        let begun = AtomicUsize::new(0);
+        let mut written = 0;
+        Pool::new(2)
+            .unwrap()
+            .run(
+                &definition,
+                &spans(&definition.populations),
+                |population, case| {
+                    begun.fetch_add(1, Ordering::Relaxed);
+                    synthetic::record(&definition, population, case)
+                },
+                |_| {
+                    if written < 100 {
+                        std::thread::sleep(Duration::from_micros(300));
+                    }
+                    written += 1;
+                    let bound = written + BLOCK * BLOCKS_PER_THREAD * 2;
+                    assert!(begun.load(Ordering::Relaxed) <= bound);
+                    Ok::<(), ()>(())
+                },
+                |_| (),
+                &AtomicBool::new(false),
+            )
+            .unwrap();
+        assert_eq!(written, 400);
+    }
+}
