@@ -6,6 +6,8 @@ pub mod outline;
 pub mod plant;
 pub mod pool;
 pub mod record;
+pub mod row;
+pub mod summary;
 #[cfg(test)]
 pub mod synthetic;
 

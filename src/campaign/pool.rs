@@ -68,7 +68,7 @@ impl Pool {
     /// Evaluates every case of `spans` and hands the records to `sink` in the order of `spans`.
     ///
     /// `evaluate` gets the population's index and the case index. A case that panics becomes a
-    /// record without draws whose evaluations all failed. `progress` is called after each record.
+    /// record without draws whose evaluations all failed; records are [`Record::checked`]. `progress` is called after each record.
     /// Once `stop` is set no case is begun; the cases begun are still handed over, and the counts
     /// returned tell how far the run came. Memory holds a bounded number of records.
     ///
@@ -148,7 +148,8 @@ fn guarded(
     case: u64,
     evaluate: &impl Fn(usize, u64) -> Record,
 ) -> Record {
-    catch_unwind(AssertUnwindSafe(|| evaluate(population, case))).unwrap_or_else(|payload| {
+    let record = catch_unwind(AssertUnwindSafe(|| evaluate(population, case)));
+    record.map(|record| record.checked(definition.modes.len())).unwrap_or_else(|payload| {
         let failure = Failure::new(FailureKind::Panic, message(payload.as_ref()));
         let evaluations = (0..definition.flight_times_s.len()).flat_map(|flight_time| {
             let outcome: Result<_, Failure> = Err(failure.clone());

@@ -161,4 +161,48 @@ impl Record {
     pub fn failure(&self) -> Option<&Failure> {
         self.evaluations.iter().find_map(|e| e.outcome.as_ref().err())
     }
+
+    /// The record with every evaluation that lacks a primary pole of one of the `modes` named
+    /// modes, or a damping ratio of one of their poles, turned into a failure.
+    pub fn checked(mut self, modes: usize) -> Self {
+        for evaluation in &mut self.evaluations {
+            let Ok(poles) = &evaluation.outcome else { continue };
+            let named = poles.iter().filter(|pole| pole.mode.is_some());
+            let failure = if let Some(pole) = named.clone().find(|p| !p.damping_ratio().is_finite())
+            {
+                let message = format!("the pole {} has no damping ratio", pole.value);
+                Failure::new(FailureKind::NonFinite, message)
+            } else if let Some(lost) = (0..modes).find(|mode| {
+                !named.clone().any(|p| p.mode == Some(*mode) && p.branch == Branch::Primary)
+            }) {
+                let message = format!("no pole of the named mode {lost}");
+                Failure::new(FailureKind::IdentityLost, message)
+            } else {
+                continue;
+            };
+            evaluation.outcome = Err(failure);
+        }
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic;
+    use super::*;
+
+    #[test]
+    fn an_evaluation_without_a_finite_pole_of_every_named_mode_is_a_failure() {
+        let definition = synthetic::definition(&[3]);
+        let whole = synthetic::record(&definition, 0, 2);
+        assert_eq!(whole.clone().checked(2), whole);
+        let mut damaged = whole.clone();
+        damaged.evaluations[0].outcome.as_mut().unwrap()[0].value.re = f64::NAN;
+        damaged.evaluations[1].outcome.as_mut().unwrap().pop();
+        let checked = damaged.checked(2);
+        let kind = |index: usize| checked.evaluations[index].outcome.as_ref().map_err(|f| f.kind);
+        assert_eq!(kind(0), Err(FailureKind::NonFinite));
+        assert_eq!(kind(1), Err(FailureKind::IdentityLost));
+        assert_eq!(checked.evaluations[2..], whole.evaluations[2..]);
+    }
 }

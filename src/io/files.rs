@@ -42,6 +42,14 @@ pub fn open(path: &Path) -> Result<File, Problems> {
     File::open(path).map_err(|e| problem(path, &e, "a readable file"))
 }
 
+/// Size of a file, bytes.
+///
+/// # Errors
+/// What the system says of it.
+pub fn size(path: &Path) -> io::Result<u64> {
+    Ok(fs::metadata(path)?.len())
+}
+
 /// BLAKE3 digest of a file's bytes, hexadecimal.
 ///
 /// # Errors

@@ -1,3 +1,15 @@
 //! Input and output: the only module that touches the disk.
 
+pub mod column;
 pub mod files;
+pub mod manifest;
+pub mod results;
+pub mod run;
+pub mod schema;
+pub mod summarise;
+#[cfg(test)]
+mod synthetic;
+pub mod table;
+
+pub use results::{Finished, Results};
+pub use run::Run;

@@ -1,0 +1,615 @@
+//! A finished run being read: its outline, its tables row by row, and whether they are whole.
+//!
+//! What the rows sum up to is decided in `campaign::summary`; how they were written in `results`.
+
+use super::files;
+use super::manifest::Manifest;
+use super::schema::{self, TableName};
+use super::table::Content;
+use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
+use crate::campaign::row::ModeRow;
+use crate::campaign::{Outline, Population};
+use crate::problem::{Kind, Problems};
+use arrow::array::{Array, AsArray};
+use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Int64Type};
+use arrow::record_batch::RecordBatch;
+use nalgebra::Complex;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+type Builder = ParquetRecordBatchReaderBuilder<File>;
+
+/// Rows decoded at once.
+const BATCH: usize = 8192;
+
+/// A finished run.
+#[derive(Debug, Clone)]
+pub struct Run {
+    folder: PathBuf,
+    outline: Outline,
+    contents: BTreeMap<TableName, Content>,
+}
+
+/// The draws of one stored case; none where the case panicked or a value has no score.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StoredDraws {
+    /// Drawn value per draw key.
+    pub values: Vec<Option<f64>>,
+    /// Normal score per draw key.
+    pub scores: Vec<Option<f64>>,
+}
+
+impl Run {
+    /// Opens the run in `folder`: reads the manifest and checks that every table is there with the
+    /// bytes, columns and rows stated.
+    ///
+    /// # Errors
+    /// Input: no such folder. Damage: every table that is missing or not as stated, or a manifest
+    /// that is missing, damaged or of another schema version.
+    pub fn open(folder: &Path) -> Result<Self, Problems> {
+        let manifest = Manifest::read(folder)?;
+        let name = files::name(&folder.join(super::manifest::FILE));
+        let mut problems = Problems::default();
+        let mut contents = BTreeMap::new();
+        for table in TableName::ALL {
+            let Some(content) = manifest.tables.get(table.name()) else {
+                let key = format!("tables.{}", table.name());
+                problems.push(Kind::Damage, &name, key, "nothing", "rows, bytes and digest");
+                continue;
+            };
+            let path = folder.join(table.file());
+            let found = match files::size(&path) {
+                Err(error) => error.to_string(),
+                Ok(bytes) if bytes != content.bytes => format!("{bytes} bytes"),
+                Ok(_) => format!("BLAKE3 {}", files::digest(&path)?),
+            };
+            let allowed = format!("BLAKE3 {}", content.blake3);
+            if found != allowed {
+                let allowed = format!("{} bytes of {allowed}", content.bytes);
+                problems.push(Kind::Damage, files::name(&path), "", found, allowed);
+            }
+            contents.insert(table, content.clone());
+        }
+        let rows = contents.get(&TableName::Cases).map(|content| content.rows);
+        let cases = manifest.run.definition.populations.iter().map(|p| u128::from(p.cases)).sum();
+        if rows.is_some_and(|rows| u128::from(rows) != cases) {
+            let (found, allowed) = (format!("{rows:?}"), format!("{cases}, one for each case"));
+            problems.push(Kind::Damage, &name, "tables.cases.rows", found, allowed);
+        }
+        let run = problems.into_result(Self::of(folder, manifest.run, contents))?;
+        let mut problems = Problems::default();
+        for table in TableName::ALL {
+            if let Err(found) = run.checked(table) {
+                problems.extend(found);
+            }
+        }
+        problems.into_result(run)
+    }
+
+    pub(super) fn of(
+        folder: &Path,
+        outline: Outline,
+        contents: BTreeMap<TableName, Content>,
+    ) -> Self {
+        Self { folder: folder.to_owned(), outline, contents }
+    }
+
+    pub(super) fn insert(&mut self, table: TableName, content: Content) {
+        self.contents.insert(table, content);
+    }
+
+    /// The outline of the run.
+    pub fn outline(&self) -> &Outline {
+        &self.outline
+    }
+
+    /// What each table holds.
+    pub fn contents(&self) -> impl Iterator<Item = (TableName, &Content)> {
+        self.contents.iter().map(|(name, content)| (*name, content))
+    }
+
+    /// File of a table.
+    pub fn path(&self, table: TableName) -> PathBuf {
+        self.folder.join(table.file())
+    }
+
+    /// Hands the rows of the `modes` table for the given cases of a population to `visit`.
+    ///
+    /// # Errors
+    /// Damage in the table, or what `visit` returns.
+    pub fn modes(
+        &self,
+        population: usize,
+        cases: Range<u64>,
+        mut visit: impl FnMut(ModeRow) -> Result<(), Problems>,
+    ) -> Result<(), Problems> {
+        let mut reader = self.reader(TableName::Modes, |_| true, population, &cases)?;
+        while let Some(batch) = self.next(TableName::Modes, &mut reader)? {
+            for row in self.mode_rows(&batch)? {
+                if row.population != population {
+                    let name = &self.outline.definition.populations[population].name;
+                    return Err(self.damage(TableName::Modes, "another population", name));
+                }
+                if cases.contains(&row.case) {
+                    visit(row)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Columns of numbers of the `cases` table for one population, by case index; NaN for NULL.
+    ///
+    /// # Errors
+    /// Damage in the table.
+    ///
+    /// # Panics
+    /// If a column is not in the registry or holds no numbers.
+    pub fn numbers(&self, population: usize, names: &[&str]) -> Result<Vec<Vec<f64>>, Problems> {
+        let cases = self.outline.definition.populations[population].cases;
+        let mut series: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
+        let chosen = |name: &str| name == "case" || names.contains(&name);
+        let mut reader = self.reader(TableName::Cases, chosen, population, &(0..cases))?;
+        let mut next = 0;
+        while let Some(batch) = self.next(TableName::Cases, &mut reader)? {
+            self.check_cases(&batch, next)?;
+            next += batch.num_rows() as u64;
+            for (series, name) in series.iter_mut().zip(names) {
+                let column = batch.column_by_name(name).expect("a column of the registry");
+                series.extend(numbers(column).map(|value| value.unwrap_or(f64::NAN)));
+            }
+        }
+        if next != cases {
+            let allowed = format!("{cases} cases of a population");
+            return Err(self.damage(TableName::Cases, next.to_string(), allowed));
+        }
+        Ok(series)
+    }
+
+    /// The draws of some cases of a population.
+    ///
+    /// # Errors
+    /// Damage in the table.
+    pub fn draws(
+        &self,
+        population: usize,
+        cases: impl IntoIterator<Item = u64>,
+    ) -> Result<BTreeMap<u64, StoredDraws>, Problems> {
+        let draws = &self.outline.draws;
+        let scores: Vec<String> = draws.iter().map(|draw| draw.score_column()).collect();
+        let is_draw = |name: &str| draws.iter().any(|draw| draw.column == name);
+        let chosen =
+            |name: &str| name == "case" || is_draw(name) || scores.iter().any(|s| s == name);
+        let group = TableName::Cases.group_cases(&self.outline);
+        let mut wanted: BTreeMap<u64, Vec<u64>> = BTreeMap::new();
+        for case in cases {
+            wanted.entry(case / group).or_default().push(case);
+        }
+        let mut found = BTreeMap::new();
+        for (index, cases) in wanted {
+            let mut next = index * group;
+            let range = next..next + 1;
+            let mut reader = self.reader(TableName::Cases, chosen, population, &range)?;
+            while let Some(batch) = self.next(TableName::Cases, &mut reader)? {
+                self.check_cases(&batch, next)?;
+                let rows = next..next + batch.num_rows() as u64;
+                for case in cases.iter().filter(|case| rows.contains(case)) {
+                    let row = (case - next) as usize;
+                    let value = |name: &str| {
+                        let column = batch.column_by_name(name).expect("a column of the registry");
+                        numbers(column).nth(row).flatten()
+                    };
+                    let stored = StoredDraws {
+                        values: draws.iter().map(|draw| value(&draw.column)).collect(),
+                        scores: scores.iter().map(|name| value(name)).collect(),
+                    };
+                    found.insert(*case, stored);
+                }
+                next = rows.end;
+            }
+            if let Some(lost) = cases.iter().find(|case| !found.contains_key(case)) {
+                return Err(self.damage(TableName::Cases, "the end", format!("case {lost}")));
+            }
+        }
+        Ok(found)
+    }
+
+    /// Opens a table and checks its columns, rows and row groups.
+    fn checked(&self, table: TableName) -> Result<Builder, Problems> {
+        let file = files::open(&self.path(table))
+            .map_err(|error| self.damage(table, error.to_string(), "a readable table"))?;
+        let builder = decoded(|| Builder::try_new(file))
+            .map_err(|found| self.damage(table, found, "a Parquet table"))?;
+        let allowed = table.fields(&self.outline);
+        let same = |(found, allowed): (&Arc<Field>, &Field)| {
+            found.name() == allowed.name() && found.data_type() == allowed.data_type()
+        };
+        let found = builder.schema().fields();
+        if found.len() != allowed.len() || !found.iter().zip(&allowed).all(same) {
+            return Err(self.damage(table, "other columns", "the columns of the data dictionary"));
+        }
+        let rows = self.contents[&table].rows;
+        let found = builder.metadata().file_metadata().num_rows();
+        if u64::try_from(found) != Ok(rows) {
+            return Err(self.damage(table, format!("{found} rows"), format!("{rows} rows")));
+        }
+        let groups = match table {
+            TableName::Cases | TableName::Modes => {
+                self.groups(table, &self.outline.definition.populations)
+            }
+            _ => u64::from(rows > 0),
+        };
+        let found = builder.metadata().num_row_groups();
+        if found as u64 != groups {
+            let allowed = format!("{groups} row groups");
+            return Err(self.damage(table, format!("{found} row groups"), allowed));
+        }
+        Ok(builder)
+    }
+
+    /// Number of row groups of some populations in a table that follows the cases.
+    fn groups(&self, table: TableName, populations: &[Population]) -> u64 {
+        let cases = table.group_cases(&self.outline);
+        populations.iter().map(|p| p.cases.div_ceil(cases)).sum()
+    }
+
+    /// Reads chosen columns of the row groups that hold some cases of a population.
+    fn reader(
+        &self,
+        table: TableName,
+        chosen: impl Fn(&str) -> bool,
+        population: usize,
+        cases: &Range<u64>,
+    ) -> Result<ParquetRecordBatchReader, Problems> {
+        let builder = self.checked(table)?;
+        let populations = &self.outline.definition.populations;
+        let (size, end) =
+            (table.group_cases(&self.outline), cases.end.min(populations[population].cases));
+        let first = self.groups(table, &populations[..population]);
+        let wanted = if cases.start < end {
+            first + cases.start / size..first + end.div_ceil(size)
+        } else {
+            0..0
+        };
+        let fields = builder.schema().fields().iter().enumerate();
+        let leaves: Vec<usize> =
+            fields.filter(|(_, field)| chosen(field.name())).map(|(index, _)| index).collect();
+        let mask = ProjectionMask::leaves(builder.parquet_schema(), leaves);
+        let builder = builder
+            .with_projection(mask)
+            .with_row_groups(wanted.map(|group| group as usize).collect())
+            .with_batch_size(BATCH);
+        decoded(|| builder.build()).map_err(|found| self.damage(table, found, "a Parquet table"))
+    }
+
+    fn next(
+        &self,
+        table: TableName,
+        reader: &mut ParquetRecordBatchReader,
+    ) -> Result<Option<RecordBatch>, Problems> {
+        decoded(|| reader.next().transpose())
+            .map_err(|found| self.damage(table, found, "a Parquet table"))
+    }
+
+    /// The case indices of a batch of `cases` go on from `next`.
+    fn check_cases(&self, batch: &RecordBatch, next: u64) -> Result<(), Problems> {
+        let column = batch.column_by_name("case").expect("a column of the registry");
+        let found = column.as_primitive::<Int64Type>();
+        for (row, allowed) in (next..).take(batch.num_rows()).enumerate() {
+            if found.is_null(row) || found.value(row) as u64 != allowed {
+                let found = format!("case {}", found.value(row));
+                return Err(self.damage(TableName::Cases, found, format!("case {allowed}")));
+            }
+        }
+        Ok(())
+    }
+
+    fn mode_rows(&self, batch: &RecordBatch) -> Result<Vec<ModeRow>, Problems> {
+        let definition = &self.outline.definition;
+        let column = |name: &str| batch.column_by_name(name).expect("a column of the registry");
+        let words = |name: &'static str, words: &[&str]| {
+            let array = column(name).as_dictionary::<Int32Type>();
+            let known: Vec<Option<usize>> = array
+                .values()
+                .as_string::<i32>()
+                .iter()
+                .map(|word| words.iter().position(|known| Some(*known) == word))
+                .collect();
+            let index = |row: usize| match array.key(row) {
+                None => Ok(None),
+                Some(key) => known.get(key).copied().flatten().map(Some).ok_or_else(|| {
+                    let found = "a word that the run does not know";
+                    let allowed = format!("one of {} in {name}", words.join(", "));
+                    self.damage(TableName::Modes, found, allowed)
+                }),
+            };
+            (0..batch.num_rows()).map(index).collect::<Result<Vec<_>, _>>()
+        };
+        let populations: Vec<&str> =
+            definition.populations.iter().map(|p| p.name.as_str()).collect();
+        let variants: Vec<&str> = definition.variants.iter().map(|v| v.name.as_str()).collect();
+        let modes: Vec<&str> = definition.modes.iter().map(String::as_str).collect();
+        let population = words("population", &populations)?;
+        let variant = words("variant", &variants)?;
+        let mode = words("mode", &modes)?;
+        let branch = words("branch", &schema::BRANCHES.map(Branch::name))?;
+        let status = words("status", &schema::statuses().collect::<Vec<_>>())?;
+        let case = column("case").as_primitive::<Int64Type>();
+        let time = column("flight_time_s").as_primitive::<Float64Type>();
+        let (label, message) = (column("label"), column("failure_message"));
+        let text = |array: &dyn Array, row: usize| {
+            let array = array.as_string::<i32>();
+            array.is_valid(row).then(|| array.value(row).to_owned())
+        };
+        let number = |name: &str, row: usize| {
+            let array = column(name).as_primitive::<Float64Type>();
+            array.is_valid(row).then(|| array.value(row))
+        };
+        let mut rows = Vec::with_capacity(batch.num_rows());
+        for row in 0..batch.num_rows() {
+            let damage = |found: &str, allowed: &str| self.damage(TableName::Modes, found, allowed);
+            let flight_time = definition
+                .flight_times_s
+                .iter()
+                .position(|t| time.is_valid(row) && t.to_bits() == time.value(row).to_bits());
+            let (Some(population), Some(variant), Some(flight_time), true) =
+                (population[row], variant[row], flight_time, case.is_valid(row))
+            else {
+                return Err(damage("a row of no evaluation", "population, case, variant and time"));
+            };
+            let outcome = match status[row] {
+                Some(0) => {
+                    let (Some(re), Some(im), Some(branch)) =
+                        (number("pole_re_rad_s", row), number("pole_im_rad_s", row), branch[row])
+                    else {
+                        return Err(damage("a row without its pole", "a pole where status is ok"));
+                    };
+                    Ok(Pole {
+                        mode: mode[row],
+                        branch: schema::BRANCHES[branch],
+                        label: text(label, row),
+                        value: Complex::new(re, im),
+                        identity_confidence: number("identity_confidence", row),
+                        participation_structure: number("participation_structure", row),
+                        participation_nozzle: number("participation_nozzle", row),
+                        residual: number("residual", row),
+                    })
+                }
+                Some(failed) => Err(Failure::new(
+                    FailureKind::ALL[failed - 1],
+                    text(message, row).unwrap_or_default(),
+                )),
+                None => return Err(damage("a row without a status", "ok or a failure")),
+            };
+            let case = case.value(row) as u64;
+            let mode = mode[row];
+            rows.push(ModeRow { population, case, variant, flight_time, mode, outcome });
+        }
+        Ok(rows)
+    }
+
+    pub(super) fn damage(
+        &self,
+        table: TableName,
+        found: impl Into<String>,
+        allowed: impl Into<String>,
+    ) -> Problems {
+        Problems::damage(files::name(&self.path(table)), "", found, allowed)
+    }
+}
+
+/// What the Parquet reader gives, or what it says of its bytes: on damaged ones it may panic.
+fn decoded<T, E: ToString>(read: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
+    match catch_unwind(AssertUnwindSafe(read)) {
+        Ok(result) => result.map_err(|error| error.to_string()),
+        Err(_) => Err("bytes that make no sense".to_owned()),
+    }
+}
+
+/// The numbers of a column, whole or not.
+fn numbers(column: &dyn Array) -> Box<dyn Iterator<Item = Option<f64>> + '_> {
+    match column.data_type() {
+        DataType::Float64 => Box::new(column.as_primitive::<Float64Type>().iter()),
+        DataType::Int64 => {
+            Box::new(column.as_primitive::<Int64Type>().iter().map(|v| v.map(|v| v as f64)))
+        }
+        other => panic!("a column of type {other} holds no numbers"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![expect(clippy::disallowed_methods, reason = "tests damage files on purpose")]
+
+    use super::super::{manifest, summarise, synthetic};
+    use super::*;
+    use crate::campaign::pool::{Pool, spans};
+    use crate::campaign::row::rows;
+    use crate::campaign::{StoredPoles, synthetic as cases};
+    use std::fs;
+    use std::sync::atomic::AtomicBool;
+
+    fn finished(folder: &Path, populations: &[u64], poles: StoredPoles) -> PathBuf {
+        let run = folder.join("run");
+        synthetic::run(&run, cases::outline(populations, poles), 2).unwrap();
+        run
+    }
+
+    #[test]
+    fn every_row_comes_back_bit_for_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, poles) in [("named", StoredPoles::Named), ("all", StoredPoles::All)] {
+            let path = finished(&folder.path().join(name), &[1, 1100, 40], poles);
+            let run = Run::open(&path).unwrap();
+            assert_eq!(*run.outline(), cases::outline(&[1, 1100, 40], poles));
+            let definition = run.outline().definition.clone();
+            let mut expected: Vec<Vec<ModeRow>> = vec![Vec::new(); 3];
+            let mut draws: Vec<BTreeMap<u64, StoredDraws>> = vec![BTreeMap::new(); 3];
+            Pool::new(2)
+                .unwrap()
+                .run(
+                    &definition,
+                    &spans(&definition.populations),
+                    |population, case| {
+                        assert!(case != 19, "case 19 breaks");
+                        cases::evaluate(&definition, population, case, poles)
+                    },
+                    |record| {
+                        let (case, modes) = rows(&definition, record);
+                        expected[case.population].extend(modes);
+                        let known = |values: &[f64]| -> Vec<Option<f64>> {
+                            let known = |i: usize| values.get(i).copied().filter(|v| v.is_finite());
+                            (0..2).map(known).collect()
+                        };
+                        let stored = StoredDraws {
+                            values: known(&case.values),
+                            scores: known(&case.scores),
+                        };
+                        draws[case.population].insert(case.case, stored);
+                        Ok::<(), ()>(())
+                    },
+                    |_| (),
+                    &AtomicBool::new(false),
+                )
+                .unwrap();
+            for (population, expected) in expected.iter().enumerate() {
+                let mut found = Vec::new();
+                run.modes(population, 0..u64::MAX, |row| {
+                    found.push(row);
+                    Ok(())
+                })
+                .unwrap();
+                assert_eq!(found, *expected);
+                let all = draws[population].keys().copied();
+                assert_eq!(run.draws(population, all).unwrap(), draws[population]);
+            }
+            let mut one = Vec::new();
+            run.modes(1, 1030..1031, |row| {
+                one.push(row);
+                Ok(())
+            })
+            .unwrap();
+            let of_case = expected[1].iter().filter(|row| row.case == 1030);
+            assert!(one.iter().eq(of_case) && !one.is_empty());
+        }
+    }
+
+    #[test]
+    fn the_summary_is_the_same_when_computed_again_within_any_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run");
+        let outline = cases::outline(&[1, 1100, 40], StoredPoles::All);
+        let stored = synthetic::run(&path, outline, 2).unwrap();
+        let run = Run::open(&path).unwrap();
+        for memory in [0, 200_000, summarise::MEMORY] {
+            assert_eq!(summarise::summary(&run, memory).unwrap(), stored.summary);
+        }
+        assert_eq!(summarise::worst(&run, 3).unwrap(), stored.worst);
+    }
+
+    #[test]
+    fn a_table_cut_short_anywhere_is_damage_of_that_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = finished(folder.path(), &[1, 30], StoredPoles::Named);
+        let run = Run::open(&path).unwrap();
+        for table in TableName::ALL {
+            let file = path.join(table.file());
+            let whole = fs::read(&file).unwrap();
+            let last = (whole.len() - 20..whole.len()).rev();
+            for length in (0..whole.len()).step_by(whole.len() / 40).chain(last) {
+                fs::write(&file, &whole[..length]).unwrap();
+                let problems = Run::open(&path).unwrap_err();
+                assert_eq!(problems.kind(), Kind::Damage);
+                assert!(problems.to_string().contains(&table.file()), "{problems}");
+                // Nor does the Parquet reader go along with it where the size is not looked at.
+                let problems = run.checked(table).err().unwrap();
+                assert_eq!(problems.kind(), Kind::Damage);
+            }
+            fs::write(&file, &whole).unwrap();
+        }
+        Run::open(&path).unwrap();
+    }
+
+    #[test]
+    fn a_changed_byte_is_found_by_its_digest() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = finished(folder.path(), &[1, 30], StoredPoles::Named);
+        let file = path.join(TableName::Modes.file());
+        let mut bytes = fs::read(&file).unwrap();
+        bytes[1000] ^= 1;
+        fs::write(&file, bytes).unwrap();
+        let problems = Run::open(&path).unwrap_err();
+        assert_eq!((problems.kind(), problems.0.len()), (Kind::Damage, 1));
+        assert!(problems.to_string().contains("modes.parquet"));
+    }
+
+    #[test]
+    fn damaged_bytes_end_in_a_problem_or_in_rows_and_never_in_a_panic() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = finished(folder.path(), &[1, 30], StoredPoles::Named);
+        let run = Run::open(&path).unwrap();
+        let file = path.join(TableName::Modes.file());
+        let whole = fs::read(&file).unwrap();
+        let mut found = 0;
+        for index in (0..whole.len()).step_by(whole.len() / 300) {
+            let mut bytes = whole.clone();
+            bytes[index] = bytes[index].wrapping_add(0x55);
+            fs::write(&file, bytes).unwrap();
+            if let Err(problems) = run.modes(1, 0..30, |_| Ok(())) {
+                assert_eq!(problems.kind(), Kind::Damage);
+                found += 1;
+            }
+        }
+        assert!(found > 0);
+    }
+
+    #[test]
+    fn missing_tables_are_named_all_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = finished(folder.path(), &[1], StoredPoles::Named);
+        for table in [TableName::Cases, TableName::Worst] {
+            fs::remove_file(path.join(table.file())).unwrap();
+        }
+        let problems = Run::open(&path).unwrap_err();
+        assert_eq!((problems.kind(), problems.0.len()), (Kind::Damage, 2));
+    }
+
+    #[test]
+    fn tables_of_another_run_are_damage() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = finished(folder.path(), &[1, 30], StoredPoles::Named);
+        let other = finished(&folder.path().join("other"), &[1, 31], StoredPoles::Named);
+        fs::copy(other.join(TableName::Cases.file()), path.join(TableName::Cases.file())).unwrap();
+        assert_eq!(Run::open(&path).unwrap_err().kind(), Kind::Damage);
+    }
+
+    #[test]
+    fn an_unfinished_run_another_version_and_a_cut_manifest_are_damage() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = finished(folder.path(), &[1, 5], StoredPoles::Named);
+        assert_eq!(Run::open(&path.join("none")).unwrap_err().kind(), Kind::Input);
+        let file = path.join(manifest::FILE);
+        let text = fs::read_to_string(&file).unwrap();
+        for length in (0..text.len() - 2).step_by(7) {
+            fs::write(&file, &text[..length]).unwrap();
+            let problems = Run::open(&path).unwrap_err();
+            assert_eq!(problems.kind(), Kind::Damage);
+            assert!(problems.to_string().contains(manifest::FILE));
+        }
+        fs::write(&file, text.replace("\"schema_version\": 1", "\"schema_version\": 99")).unwrap();
+        let problems = Run::open(&path).unwrap_err().to_string();
+        assert!(problems.contains("schema_version: found 99; allowed: 1"), "{problems}");
+        let greedy = text.replace("\"cases\": 5", "\"cases\": 9007199254740991");
+        assert_ne!(greedy, text);
+        fs::write(&file, greedy).unwrap();
+        assert_eq!(Run::open(&path).unwrap_err().kind(), Kind::Damage);
+        fs::remove_file(&file).unwrap();
+        assert!(Run::open(&path).unwrap_err().to_string().contains("unfinished"));
+    }
+}

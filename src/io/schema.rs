@@ -1,0 +1,440 @@
+//! The registry of the results tables: every column is declared here, once.
+//!
+//! Schemas, data dictionary and documentation derive from it; how rows are gathered and stored is
+//! decided in `column` and `table`.
+
+use super::column::Column;
+use crate::campaign::metric::metrics;
+use crate::campaign::outline::{Outline, StoredPoles};
+use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
+use crate::campaign::row::{CaseRow, ModeRow};
+use crate::campaign::summary::{LEVELS, Spread, SummaryRow, WorstRow};
+use arrow::datatypes::Field;
+use std::sync::Arc;
+
+/// Version of the tables' columns and metadata; a change of either raises it.
+pub const VERSION: u32 = 1;
+
+/// Cases in a row group of the `cases` table, and the most in one of `modes`.
+const MOST_GROUP_CASES: u64 = 1024;
+/// Rows of a row group of the `modes` table are kept near this number.
+const GROUP_ROWS: u64 = 128 << 10;
+/// Poles of an evaluation reckoned with where all are stored.
+const ALL_POLES: u64 = 128;
+
+/// A results table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum TableName {
+    /// One row per case: draws, scalar metrics, status.
+    Cases,
+    /// One row per stored pole of every evaluation.
+    Modes,
+    /// One row per population, variant, flight time and named mode.
+    Summary,
+    /// The worst cases with their draws.
+    Worst,
+    /// The data dictionary.
+    Columns,
+}
+
+impl TableName {
+    /// Every table, in the order of writing.
+    pub const ALL: [Self; 5] =
+        [Self::Cases, Self::Modes, Self::Summary, Self::Worst, Self::Columns];
+
+    /// The word in file names.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cases => "cases",
+            Self::Modes => "modes",
+            Self::Summary => "summary",
+            Self::Worst => "worst",
+            Self::Columns => "columns",
+        }
+    }
+
+    /// File of the table inside the run's folder.
+    pub fn file(self) -> String {
+        format!("tables/{}.parquet", self.name())
+    }
+
+    /// The fields of the table's schema.
+    pub fn fields(self, outline: &Outline) -> Vec<Field> {
+        fn fields<R>(columns: &[Column<R>]) -> Vec<Field> {
+            columns.iter().map(Column::field).collect()
+        }
+        match self {
+            Self::Cases => fields(&cases(outline)),
+            Self::Modes => fields(&modes(outline)),
+            Self::Summary => fields(&summary(outline)),
+            Self::Worst => fields(&worst(outline)),
+            Self::Columns => fields(&columns()),
+        }
+    }
+
+    /// Cases in a full row group, where the table follows the cases; a power of two, so that
+    /// boundaries of all tables and of shards coincide. Fixed by the outline.
+    pub fn group_cases(self, outline: &Outline) -> u64 {
+        if self != Self::Modes {
+            return MOST_GROUP_CASES;
+        }
+        let definition = &outline.definition;
+        let poles = match outline.poles {
+            StoredPoles::Named => definition.modes.len() as u64,
+            StoredPoles::All => ALL_POLES,
+        };
+        let evaluations = definition.variants.len() * definition.flight_times_s.len();
+        let rows = (evaluations as u64 * poles).max(1);
+        let cases = (GROUP_ROWS / rows).clamp(1, MOST_GROUP_CASES);
+        1 << cases.ilog2()
+    }
+}
+
+/// Words of the `status` columns: `ok`, then the failures.
+pub fn statuses() -> impl Iterator<Item = &'static str> {
+    std::iter::once("ok").chain(FailureKind::ALL.map(FailureKind::name))
+}
+
+/// Words of the `branch` column.
+pub const BRANCHES: [Branch; 3] = [Branch::Primary, Branch::Partner, Branch::Other];
+
+fn status(failure: Option<&Failure>) -> usize {
+    let kind = |failure: &Failure| FailureKind::ALL.iter().position(|kind| *kind == failure.kind);
+    failure.map_or(0, |failure| 1 + kind(failure).expect("ALL holds every kind"))
+}
+
+fn population<R>(outline: &Outline, get: impl Fn(&R) -> usize + Send + 'static) -> Column<R> {
+    let names = outline.definition.populations.iter().map(|p| p.name.clone());
+    Column::word("population", "Set of cases the row belongs to", names, move |r| Some(get(r)))
+}
+
+fn variant<R>(outline: &Outline, get: impl Fn(&R) -> usize + Send + 'static) -> Column<R> {
+    let names = outline.definition.variants.iter().map(|v| v.name.clone());
+    Column::word("variant", "Way of evaluating the draws", names, move |r| Some(get(r)))
+}
+
+fn mode<R>(
+    outline: &Outline,
+    description: &str,
+    get: impl Fn(&R) -> Option<usize> + Send + 'static,
+) -> Column<R> {
+    Column::word("mode", description, outline.definition.modes.clone(), get)
+}
+
+/// Columns of the `cases` table.
+pub fn cases(outline: &Outline) -> Vec<Column<CaseRow>> {
+    let mut columns = vec![
+        population(outline, |r: &CaseRow| r.population),
+        Column::count("case", "Case index inside the population", |r: &CaseRow| {
+            Some(r.case as i64)
+        }),
+        Column::word(
+            "status",
+            "ok, or the kind of the first failure",
+            statuses(),
+            |r: &CaseRow| Some(status(r.failure.as_ref())),
+        ),
+        Column::text("failure_message", "What the first failure says", |r: &CaseRow| {
+            r.failure.as_ref().map(|f| f.message.as_str())
+        }),
+    ];
+    for metric in metrics(&outline.definition) {
+        let (name, unit, description) = (metric.name.clone(), metric.unit, &metric.description);
+        let description = format!("{description}; NULL if an evaluation failed");
+        columns.push(if metric.counts() {
+            Column::count(name, description, move |r: &CaseRow| {
+                metric.value(&r.reduced).map(|value| value as i64)
+            })
+        } else {
+            Column::number(name, unit, description, move |r: &CaseRow| metric.value(&r.reduced))
+        });
+    }
+    for (index, draw) in outline.draws.iter().enumerate() {
+        let description = format!("{}; key {}", draw.description, draw.key);
+        let value = move |r: &CaseRow| r.values.get(index).copied();
+        columns.push(Column::number(&draw.column, &draw.unit, description, value));
+    }
+    for (index, draw) in outline.draws.iter().enumerate() {
+        let description =
+            format!("Normal score of {}; NULL for a value beyond its law", draw.column);
+        let score = move |r: &CaseRow| r.scores.get(index).copied();
+        columns.push(Column::number(draw.score_column(), "sigma", description, score));
+    }
+    columns
+}
+
+/// Columns of the `modes` table.
+pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
+    let times = outline.definition.flight_times_s.clone();
+    let number = |name: &str, unit: &str, description: &str, get: fn(&Pole) -> Option<f64>| {
+        Column::number(name, unit, description, move |r: &ModeRow| {
+            r.outcome.as_ref().ok().and_then(get)
+        })
+    };
+    vec![
+        population(outline, |r: &ModeRow| r.population),
+        Column::count("case", "Case index inside the population", |r: &ModeRow| {
+            Some(r.case as i64)
+        }),
+        variant(outline, |r: &ModeRow| r.variant),
+        Column::number("flight_time_s", "s", "Flight time", move |r: &ModeRow| {
+            times.get(r.flight_time).copied()
+        }),
+        mode(outline, "Named mode; NULL for a pole of no named mode", |r: &ModeRow| r.mode),
+        Column::word(
+            "branch",
+            "primary: the pole identified as the named mode; partner: the pole it exchanges \
+             character with; other: a pole of no named mode; NULL if failed",
+            BRANCHES.map(Branch::name),
+            |r: &ModeRow| {
+                let branch = r.outcome.as_ref().ok()?.branch;
+                BRANCHES.iter().position(|other| *other == branch)
+            },
+        ),
+        Column::text("label", "Modal label the pole carries, if any", |r: &ModeRow| {
+            r.outcome.as_ref().ok()?.label.as_deref()
+        }),
+        number("pole_re_rad_s", "rad/s", "Real part of the pole; NULL if failed", |p| {
+            Some(p.value.re)
+        }),
+        number("pole_im_rad_s", "rad/s", "Imaginary part of the pole; NULL if failed", |p| {
+            Some(p.value.im)
+        }),
+        number("frequency_hz", "Hz", "Frequency, |Im s|/2π; NULL if failed", |p| {
+            Some(p.frequency_hz())
+        }),
+        number("damping_ratio", "1", "Damping ratio, −Re s/|s|; NULL if failed", |p| {
+            Some(p.damping_ratio())
+        }),
+        number(
+            "time_to_double_s",
+            "s",
+            "Time to double, ln 2/Re s; NULL if stable or failed",
+            Pole::time_to_double_s,
+        ),
+        number(
+            "identity_confidence",
+            "1",
+            "Modulus of the two-sided overlap with the nominal pole of the same name",
+            |p| p.identity_confidence,
+        ),
+        number(
+            "participation_structure",
+            "1",
+            "Sum of the participation factors of the elastic states",
+            |p| p.participation_structure,
+        ),
+        number(
+            "participation_nozzle",
+            "1",
+            "Sum of the participation factors of the gimbal states",
+            |p| p.participation_nozzle,
+        ),
+        number("residual", "1", "Relative residual of the eigenpair", |p| p.residual),
+        Column::word("status", "ok, or the kind of failure", statuses(), |r: &ModeRow| {
+            Some(status(r.outcome.as_ref().err()))
+        }),
+        Column::text("failure_message", "What the failure says", |r: &ModeRow| {
+            r.outcome.as_ref().err().map(|f| f.message.as_str())
+        }),
+    ]
+}
+
+/// Columns of the `summary` table.
+pub fn summary(outline: &Outline) -> Vec<Column<SummaryRow>> {
+    let times = outline.definition.flight_times_s.clone();
+    let count = |name: &str, description: &str, get: fn(&SummaryRow) -> u64| {
+        Column::count(name, description, move |r: &SummaryRow| Some(get(r) as i64))
+    };
+    let mut columns = vec![
+        population(outline, |r: &SummaryRow| r.group.population),
+        variant(outline, |r: &SummaryRow| r.group.variant),
+        Column::number(
+            "flight_time_s",
+            "s",
+            "Flight time; NULL for the row in which each case is reduced to its worst over the \
+             flight times",
+            move |r: &SummaryRow| times.get(r.group.flight_time?).copied(),
+        ),
+        mode(outline, "Named mode", |r: &SummaryRow| Some(r.group.mode)),
+        count("cases", "Cases of the population", |r| r.cases),
+        count("failures", "Cases without a result", |r| r.failures),
+        count("unstable", "Cases with an unstable pole", |r| r.unstable),
+        Column::number(
+            "share_unstable",
+            "1",
+            "Share of unstable cases among those with a result",
+            |r: &SummaryRow| r.share_unstable,
+        ),
+        Column::number(
+            "share_unstable_low",
+            "1",
+            "Lower end of its exact 95 % interval (Clopper and Pearson); NULL if the cases are \
+             not independent draws",
+            |r: &SummaryRow| r.share_unstable_interval.map(|[low, _]| low),
+        ),
+        Column::number(
+            "share_unstable_high",
+            "1",
+            "Upper end of that interval",
+            |r: &SummaryRow| r.share_unstable_interval.map(|[_, high]| high),
+        ),
+    ];
+    type Pick = Box<dyn Fn(&Spread) -> Option<f64> + Send>;
+    let mut spread: Vec<(&str, String, Pick)> = vec![
+        ("mean", "Mean".to_owned(), Box::new(|s| Some(s.mean))),
+        ("sd", "Sample standard deviation".to_owned(), Box::new(|s| s.standard_deviation)),
+        ("min", "Least value".to_owned(), Box::new(|s| Some(s.smallest))),
+    ];
+    for (index, (level, name)) in LEVELS.into_iter().enumerate() {
+        let description = format!("Quantile at {level} (linear between order statistics)");
+        spread.push((name, description, Box::new(move |s| Some(s.quantiles[index]))));
+    }
+    spread.push(("max", "Greatest value".to_owned(), Box::new(|s| Some(s.largest))));
+    columns.extend(spread.into_iter().map(|(name, description, pick)| {
+        Column::number(
+            format!("damping_ratio_{name}"),
+            "1",
+            format!("{description} of the damping ratio of the less stable pole"),
+            move |r: &SummaryRow| r.damping_ratio.as_ref().and_then(&pick),
+        )
+    }));
+    columns.extend([
+        Column::number(
+            "frequency_mean_hz",
+            "Hz",
+            "Mean frequency of the less stable pole",
+            |r: &SummaryRow| r.frequency_hz_mean,
+        ),
+        Column::number(
+            "time_to_double_min_s",
+            "s",
+            "Shortest time to double; NULL if no case is unstable",
+            |r: &SummaryRow| r.time_to_double_min_s,
+        ),
+        Column::number(
+            "damping_ratio_gain_min",
+            "1",
+            "Least gain of damping ratio over the first variant on the same draws and flight \
+             time; NULL for that variant",
+            |r: &SummaryRow| r.damping_ratio_gain.map(|[least, _]| least),
+        ),
+        Column::number(
+            "damping_ratio_gain_mean",
+            "1",
+            "Mean of that gain (of each case's least over the flight times, where reduced)",
+            |r: &SummaryRow| r.damping_ratio_gain.map(|[_, mean]| mean),
+        ),
+    ]);
+    columns
+}
+
+/// Columns of the `worst` table.
+pub fn worst(outline: &Outline) -> Vec<Column<WorstRow>> {
+    let keys = outline.draws.iter().map(|draw| draw.key.clone());
+    let draws: Arc<[_]> = outline.draws.clone().into();
+    let of_draw = move |r: &WorstRow| draws.get(r.draw?).cloned().zip(r.value);
+    let (fraction, outside) = (of_draw.clone(), of_draw);
+    vec![
+        population(outline, |r: &WorstRow| r.population),
+        variant(outline, |r: &WorstRow| r.variant),
+        mode(outline, "Named mode", |r: &WorstRow| Some(r.mode)),
+        Column::count("rank", "1 for the case of smallest damping ratio", |r: &WorstRow| {
+            Some(r.rank as i64)
+        }),
+        Column::count("case", "Case index inside the population", |r: &WorstRow| {
+            Some(r.case as i64)
+        }),
+        Column::number(
+            "flight_time_s",
+            "s",
+            "Flight time of the smallest damping ratio",
+            |r: &WorstRow| r.flight_time_s,
+        ),
+        Column::number(
+            "damping_ratio",
+            "1",
+            "Smallest damping ratio over the flight times",
+            |r: &WorstRow| Some(r.damping_ratio),
+        ),
+        Column::number(
+            "time_to_double_s",
+            "s",
+            "Shortest time to double over the flight times; NULL if stable",
+            |r: &WorstRow| r.time_to_double_s,
+        ),
+        Column::word("draw", "Draw key, the farthest from nominal first", keys, |r: &WorstRow| {
+            r.draw
+        }),
+        Column::number("value", "", "Drawn value, in the unit of its column", |r: &WorstRow| {
+            r.value
+        }),
+        Column::number(
+            "score_sigma",
+            "sigma",
+            "Normal score of the value; NULL for a value beyond its law",
+            |r: &WorstRow| r.score,
+        ),
+        Column::number(
+            "fraction_of_range",
+            "1",
+            "Position in the range of a bounded law, 0 at its low and 1 at its high end",
+            move |r: &WorstRow| fraction(r).and_then(|(draw, value)| draw.fraction_of_range(value)),
+        ),
+        Column::flag(
+            "outside_law",
+            "Whether the value lies beyond the range of its law",
+            move |r: &WorstRow| outside(r).map(|(draw, value)| draw.outside_law(value)),
+        ),
+    ]
+}
+
+/// One row of the data dictionary.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Described {
+    /// Table.
+    pub table: TableName,
+    /// Column.
+    pub column: String,
+    /// Type.
+    pub type_name: &'static str,
+    /// Unit.
+    pub unit: String,
+    /// Description.
+    pub description: String,
+}
+
+/// Columns of the data dictionary.
+pub fn columns() -> Vec<Column<Described>> {
+    vec![
+        Column::word("table", "Table", TableName::ALL.map(TableName::name), |r: &Described| {
+            TableName::ALL.iter().position(|table| *table == r.table)
+        }),
+        Column::text("column", "Column", |r: &Described| Some(&r.column)),
+        Column::text("type", "Type", |r: &Described| Some(r.type_name)),
+        Column::text("unit", "Unit; 1 for a pure number, NULL for text", |r: &Described| {
+            (!r.unit.is_empty()).then_some(r.unit.as_str())
+        }),
+        Column::text("description", "Description", |r: &Described| Some(&r.description)),
+    ]
+}
+
+/// The data dictionary: every column of every table.
+pub fn dictionary(outline: &Outline) -> Vec<Described> {
+    fn describe<R>(table: TableName, columns: &[Column<R>]) -> Vec<Described> {
+        let describe = |column: &Column<R>| Described {
+            table,
+            column: column.name.clone(),
+            type_name: column.type_name(),
+            unit: column.unit.clone(),
+            description: column.description.clone(),
+        };
+        columns.iter().map(describe).collect()
+    }
+    let mut all = describe(TableName::Cases, &cases(outline));
+    all.extend(describe(TableName::Modes, &modes(outline)));
+    all.extend(describe(TableName::Summary, &summary(outline)));
+    all.extend(describe(TableName::Worst, &worst(outline)));
+    all.extend(describe(TableName::Columns, &columns()));
+    all
+}

@@ -1,0 +1,133 @@
+//! One results table being written: rows gathered to row groups, bytes digested on their way.
+//!
+//! A row group ends where the caller says, so that the bytes depend on the rows alone.
+
+use super::column::{Buffer, Column};
+use super::files::Aside;
+use crate::problem::Problems;
+use arrow::datatypes::{Schema, SchemaRef};
+use arrow::record_batch::RecordBatch;
+use parquet::arrow::ArrowWriter;
+use parquet::basic::Compression;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::schema::types::ColumnPath;
+use serde::{Deserialize, Serialize};
+use std::io::{self, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+/// What a finished table holds.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Content {
+    /// Number of rows.
+    pub rows: u64,
+    /// Size of the file, bytes.
+    pub bytes: u64,
+    /// BLAKE3 digest of the file, hexadecimal.
+    pub blake3: String,
+}
+
+/// A table of rows of type `R`, written to `W`.
+pub struct Table<R, W: Write + Send = Aside> {
+    columns: Vec<Column<R>>,
+    buffers: Vec<Buffer>,
+    schema: SchemaRef,
+    writer: ArrowWriter<Digested<W>>,
+    gathered: u64,
+    rows: u64,
+}
+
+impl<R, W: Write + Send> Table<R, W> {
+    /// A table of these columns with file-level metadata.
+    ///
+    /// # Errors
+    /// What the Parquet writer says.
+    pub fn new(
+        columns: Vec<Column<R>>,
+        metadata: &[(&str, String)],
+        out: W,
+    ) -> Result<Self, ParquetError> {
+        let mut properties = WriterProperties::builder()
+            .set_created_by(concat!("tvse ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_compression(Compression::SNAPPY)
+            .set_dictionary_enabled(false)
+            .set_max_row_group_row_count(None)
+            .set_max_row_group_bytes(None);
+        for column in columns.iter().filter(|column| column.repeats()) {
+            let path = ColumnPath::from(column.name.as_str());
+            properties = properties.set_column_dictionary_enabled(path, true);
+        }
+        let pairs = metadata.iter().map(|(k, v)| KeyValue::new((*k).to_owned(), v.clone()));
+        let properties = properties.set_key_value_metadata(Some(pairs.collect())).build();
+        let schema = Arc::new(Schema::new(columns.iter().map(Column::field).collect::<Vec<_>>()));
+        let out = Digested { out, hasher: blake3::Hasher::new(), bytes: 0 };
+        let writer = ArrowWriter::try_new(out, schema.clone(), Some(properties))?;
+        let buffers = columns.iter().map(Buffer::new).collect();
+        Ok(Self { columns, buffers, schema, writer, gathered: 0, rows: 0 })
+    }
+
+    /// Adds a row.
+    pub fn push(&mut self, row: &R) {
+        for (buffer, column) in self.buffers.iter_mut().zip(&self.columns) {
+            buffer.push(column, row);
+        }
+        self.gathered += 1;
+    }
+
+    /// Ends the row group, if it has rows, and writes it.
+    ///
+    /// # Errors
+    /// What the Parquet writer or the output says.
+    pub fn end_group(&mut self) -> Result<(), ParquetError> {
+        if self.gathered == 0 {
+            return Ok(());
+        }
+        let arrays = self.buffers.iter_mut().zip(&self.columns).map(|(b, c)| b.finish(c)).collect();
+        self.writer.write(&RecordBatch::try_new(self.schema.clone(), arrays)?)?;
+        self.rows += self.gathered;
+        self.gathered = 0;
+        self.writer.flush()
+    }
+
+    /// Ends the file and gives back the output with what it holds.
+    ///
+    /// # Errors
+    /// What the Parquet writer or the output says.
+    pub fn close(mut self) -> Result<(W, Content), ParquetError> {
+        self.end_group()?;
+        let Digested { out, hasher, bytes } = self.writer.into_inner()?;
+        let blake3 = hasher.finalize().to_hex().to_string();
+        Ok((out, Content { rows: self.rows, bytes, blake3 }))
+    }
+}
+
+/// The problem of a table that could not be written.
+pub fn problem(target: &Path, error: &ParquetError) -> Problems {
+    let found = match error {
+        ParquetError::External(source) => source.to_string(),
+        other => other.to_string(),
+    };
+    super::files::write_problem(target, &io::Error::other(found))
+}
+
+/// An output whose bytes are digested and counted.
+struct Digested<W> {
+    out: W,
+    hasher: blake3::Hasher,
+    bytes: u64,
+}
+
+impl<W: Write> Write for Digested<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.out.write(bytes)?;
+        self.hasher.update(&bytes[..written]);
+        self.bytes += written as u64;
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
