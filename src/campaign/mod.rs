@@ -12,6 +12,6 @@ pub mod summary;
 pub mod synthetic;
 
 pub use definition::{Definition, NozzleJet, Population, Slope, Variant};
-pub use outline::{Draw, Input, Outline, StoredPoles};
+pub use outline::{DrawColumn, Input, Outline, StoredPoles};
 pub use pool::{Pool, Progress, Span};
 pub use record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};

@@ -17,7 +17,7 @@ pub enum StoredPoles {
 
 /// One draw key, described for a reader of the tables.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Draw {
+pub struct DrawColumn {
     /// Draw key, `instance path @ level # id`.
     pub key: String,
     /// Column of the drawn value in the `cases` table, `draw_…`.
@@ -30,10 +30,10 @@ pub struct Draw {
     pub range: Option<[f64; 2]>,
 }
 
-impl Draw {
-    /// Column of the normal score in the `cases` table: `score_…`.
+impl DrawColumn {
+    /// Column of the normal score in the `cases` table: `z_…`.
     pub fn score_column(&self) -> String {
-        format!("score_{}", self.column.strip_prefix("draw_").unwrap_or(&self.column))
+        format!("z_{}", self.column.strip_prefix("draw_").unwrap_or(&self.column))
     }
 
     /// Position of `value` in the range of a bounded law: 0 at the low, 1 at the high end.
@@ -66,7 +66,7 @@ pub struct Outline {
     /// Poles stored.
     pub poles: StoredPoles,
     /// Draw keys in the order of the dispersion.
-    pub draws: Vec<Draw>,
+    pub draws: Vec<DrawColumn>,
     /// Digests of the inputs.
     pub inputs: Vec<Input>,
 }
@@ -76,7 +76,7 @@ impl Outline {
     pub fn new(
         definition: Definition,
         poles: StoredPoles,
-        draws: Vec<Draw>,
+        draws: Vec<DrawColumn>,
         inputs: Vec<Input>,
     ) -> Self {
         let program = env!("CARGO_PKG_VERSION").to_owned();

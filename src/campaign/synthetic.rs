@@ -4,7 +4,7 @@
 //! poles and pairs of poles that exchange character.
 
 use super::definition::{Definition, NozzleJet, Population, Slope, Variant};
-use super::outline::{Draw, Input, Outline, StoredPoles};
+use super::outline::{DrawColumn, Input, Outline, StoredPoles};
 use super::record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};
 use nalgebra::Complex;
 
@@ -39,7 +39,7 @@ pub fn definition(cases: &[u64]) -> Definition {
 
 /// The outline of a synthetic run.
 pub fn outline(cases: &[u64], poles: StoredPoles) -> Outline {
-    let draw = |key: &str, column: &str, unit: &str, range| Draw {
+    let draw = |key: &str, column: &str, unit: &str, range| DrawColumn {
         key: key.to_owned(),
         column: column.to_owned(),
         unit: unit.to_owned(),

@@ -5,6 +5,7 @@
 
 pub mod error;
 pub mod how_many;
+pub mod summary;
 
 pub use error::Error;
 
@@ -34,6 +35,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     HowMany(how_many::Args),
+    Summary(summary::Args),
 }
 
 /// Parses the arguments of the process, runs the command and returns the exit code.
@@ -42,6 +44,7 @@ pub fn run() -> ExitCode {
     let mut out = std::io::stdout().lock();
     let result: Result<u8, Error> = match arguments.command {
         Command::HowMany(args) => how_many::run(&args, &mut out),
+        Command::Summary(args) => summary::run(&args, &mut out),
     };
     let code = result.unwrap_or_else(|error: Error| {
         eprintln!("{error}");

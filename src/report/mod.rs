@@ -4,5 +4,6 @@ mod number;
 
 pub mod gates;
 pub mod how_many;
+pub mod story;
 
 pub use number::{percent, significant};

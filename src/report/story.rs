@@ -1,0 +1,198 @@
+//! The story of a run as a text table: what each variant does to the damping of a named mode.
+//!
+//! It is the story of the paper's Figure 6 (poles without and with jet damping, nominal and
+//! dispersed). Only text is made here; who prints it is decided in `cli`.
+
+use crate::campaign::Outline;
+use crate::campaign::summary::{Group, LEVELS, SummaryRow, WorstRow};
+use comfy_table::{CellAlignment, Table, presets};
+use std::fmt::Write;
+
+/// Draws named in the line of a worst case.
+const DRAWS: usize = 3;
+
+/// The story: a table for every population and named mode, with its worst cases below.
+pub fn story(outline: &Outline, summary: &[SummaryRow], worst: &[WorstRow]) -> String {
+    let definition = &outline.definition;
+    let mut text = String::new();
+    for (population, p) in definition.populations.iter().enumerate() {
+        // The nominal case has its column in every table.
+        if population == 0 && definition.populations.len() > 1 && p.cases == 1 {
+            continue;
+        }
+        for (mode, name) in definition.modes.iter().enumerate() {
+            let rows = || {
+                let of = move |group: &Group| group.population == population && group.mode == mode;
+                summary.iter().filter(move |row| of(&row.group))
+            };
+            let failures = rows().filter(|row| row.group.flight_time.is_none());
+            let failures = failures.map(|row| row.failures).max().unwrap_or(0);
+            let failed = if failures > 0 { format!(", {failures} failed") } else { String::new() };
+            line(&mut text, format_args!("{name}, {}: {} cases{failed}", p.name, p.cases));
+            line(&mut text, format_args!("{}\n", table(outline, summary, rows())));
+            for (variant, v) in definition.variants.iter().enumerate() {
+                let of_variant = |row: &&WorstRow| {
+                    (row.population, row.mode, row.variant, row.rank)
+                        == (population, mode, variant, 1)
+                };
+                let rows: Vec<&WorstRow> = worst.iter().filter(of_variant).collect();
+                if let Some(sentence) = worst_case(outline, &rows) {
+                    line(&mut text, format_args!("worst case, {}: {sentence}", v.name));
+                }
+            }
+            text.push('\n');
+        }
+    }
+    text
+}
+
+fn line(text: &mut String, arguments: std::fmt::Arguments<'_>) {
+    writeln!(text, "{arguments}").expect("a string takes any text");
+}
+
+fn table<'a>(
+    outline: &Outline,
+    summary: &[SummaryRow],
+    rows: impl Iterator<Item = &'a SummaryRow>,
+) -> Table {
+    let definition = &outline.definition;
+    let mut table = Table::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    table.set_header([
+        "variant",
+        "flight time, s",
+        "nominal ζ, %",
+        "median ζ, %",
+        "least ζ, %",
+        "unstable, %",
+        "95 % interval",
+        "time to double ≥, s",
+    ]);
+    let mut last = None;
+    for row in rows {
+        let variant = row.group.variant;
+        let name = &definition.variants[variant].name;
+        let nominal = summary.iter().find(|r| r.group == Group { population: 0, ..row.group });
+        let nominal = nominal.filter(|r| r.cases == 1).and_then(|r| r.damping_ratio.as_ref());
+        let median = LEVELS.iter().position(|(level, _)| *level == 0.5).expect("a level");
+        let spread = row.damping_ratio.as_ref();
+        table.add_row([
+            if last == Some(variant) { String::new() } else { name.clone() },
+            row.group
+                .flight_time
+                .map_or_else(|| "worst".to_owned(), |t| definition.flight_times_s[t].to_string()),
+            percent(nominal.map(|spread| spread.mean), 3),
+            percent(spread.map(|spread| spread.quantiles[median]), 3),
+            percent(spread.map(|spread| spread.smallest), 3),
+            percent(row.share_unstable, 1),
+            row.share_unstable_interval.map_or_else(
+                || "–".to_owned(),
+                |[low, high]| format!("{} – {}", percent(Some(low), 1), percent(Some(high), 1)),
+            ),
+            row.time_to_double_min_s.map_or_else(|| "–".to_owned(), |t| format!("{t:.1}")),
+        ]);
+        last = Some(variant);
+    }
+    for column in table.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    table
+}
+
+fn percent(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{:.digits$}", 100.0 * value))
+}
+
+/// The sentence about a worst case from its rows, one for each draw.
+fn worst_case(outline: &Outline, rows: &[&WorstRow]) -> Option<String> {
+    let case = rows.first()?;
+    let mut sentence = format!("case {}", case.case);
+    if let Some(time) = case.flight_time_s {
+        write!(sentence, " at {time} s").expect("a string takes any text");
+    }
+    write!(sentence, ", ζ {} %", percent(Some(case.damping_ratio), 3)).expect("a string");
+    if let Some(time) = case.time_to_double_s {
+        write!(sentence, ", time to double {time:.1} s").expect("a string takes any text");
+    }
+    let drawn = outline.definition.populations[case.population].drawn;
+    let draws = rows.iter().filter(|_| drawn).filter_map(|row| {
+        let draw = &outline.draws[row.draw?];
+        let value = row.value?;
+        Some(match row.score {
+            Some(score) => format!("{} {score:+.1} σ", draw.key),
+            None => format!("{} {value} {} (outside its law)", draw.key, draw.unit),
+        })
+    });
+    let draws: Vec<String> = draws.take(DRAWS).collect();
+    if !draws.is_empty() {
+        write!(sentence, "; {}", draws.join(", ")).expect("a string takes any text");
+    }
+    Some(sentence)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::summary::{Series, groups, summarise};
+    use crate::campaign::{StoredPoles, synthetic};
+
+    fn summary(outline: &Outline) -> Vec<SummaryRow> {
+        let mut rows = Vec::new();
+        for (population, p) in outline.definition.populations.iter().enumerate() {
+            for group in groups(&outline.definition, population) {
+                let mut series = Series::unknown(p.cases as usize);
+                for case in 1..p.cases as usize {
+                    let damping = 0.001 * case as f64 - 0.0025;
+                    series.add(case, damping, 5.0, -30.0 * damping);
+                }
+                rows.push(summarise(group, p.drawn, &series).unwrap());
+            }
+        }
+        rows
+    }
+
+    #[test]
+    fn the_story_has_a_line_for_every_variant_and_time_and_names_failures() {
+        let outline = synthetic::outline(&[1, 6], StoredPoles::Named);
+        let text = story(&outline, &summary(&outline), &[]);
+        assert!(text.starts_with("tvse, dispersed: 6 cases, 1 failed\n"), "{text}");
+        let values: Vec<Vec<&str>> = text
+            .lines()
+            .filter(|line| line.starts_with('|') && !line.starts_with("|-"))
+            .map(|line| line.trim_matches('|').split('|').map(str::trim).collect())
+            .collect();
+        // Two modes, each with a heading and two variants at two times and their worst.
+        assert_eq!(values.len(), 2 * (1 + 2 * 3));
+        // Cases 1 to 5 lie at −0.15 to 0.25 %, two of them unstable; log 2/0.045 is 15.4.
+        assert_eq!(values[1][0], "no_jet");
+        assert_eq!(values[1][3..6], ["0.050", "-0.150", "40.0"]);
+        assert_eq!(values[1][7], "15.4");
+        assert_eq!(values[3][..2], ["", "worst"]);
+        // R: binom.test(2, 5)$conf.int
+        assert_eq!(values[1][6], "5.3 – 85.3");
+    }
+
+    #[test]
+    fn a_worst_case_is_told_with_its_farthest_draws() {
+        let outline = synthetic::outline(&[1, 6], StoredPoles::Named);
+        let row = |draw: usize, value: f64, score: Option<f64>| WorstRow {
+            population: 1,
+            variant: 0,
+            mode: 0,
+            rank: 1,
+            case: 4,
+            flight_time_s: Some(110.0),
+            damping_ratio: -0.0071,
+            time_to_double_s: Some(3.04),
+            draw: Some(draw),
+            value: Some(value),
+            score,
+        };
+        let worst = [row(1, 0.0025, None), row(0, 1.03, Some(2.96))];
+        let text = story(&outline, &summary(&outline), &worst);
+        let expected = "worst case, no_jet: case 4 at 110 s, ζ -0.710 %, time to double 3.0 s; \
+                        structure.damping @ mode 0.0025 1 (outside its law), \
+                        booster.left.thrust @ engine +3.0 σ\n";
+        assert!(text.contains(expected), "{text}");
+    }
+}
