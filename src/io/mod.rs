@@ -6,6 +6,7 @@ pub mod manifest;
 pub mod results;
 pub mod run;
 pub mod schema;
+pub mod source;
 pub mod summarise;
 #[cfg(test)]
 mod synthetic;

@@ -90,6 +90,12 @@ impl TableName {
     }
 }
 
+/// Whether NULL in a row that did not fail says that the quantity does not arise, which is good:
+/// the time to double of a stable pole.
+pub fn null_is_good(column: &str) -> bool {
+    column.starts_with("time_to_double")
+}
+
 /// Words of the `status` columns: `ok`, then the failures.
 pub fn statuses() -> impl Iterator<Item = &'static str> {
     std::iter::once("ok").chain(FailureKind::ALL.map(FailureKind::name))
