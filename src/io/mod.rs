@@ -14,6 +14,7 @@ pub mod run;
 pub mod scaffold;
 pub mod scenario;
 pub mod schema;
+pub mod source;
 pub mod summarise;
 #[cfg(test)]
 mod synthetic;

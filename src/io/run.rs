@@ -36,7 +36,8 @@ pub struct Run {
     contents: BTreeMap<TableName, Content>,
 }
 
-/// The draws of one stored case; none where the case panicked or a value has no score.
+/// The draws of one stored case; none where a value stays nominal, has no score, or the case
+/// panicked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredDraws {
     /// Drawn value per draw key.
@@ -170,6 +171,30 @@ impl Run {
             return Err(self.damage(TableName::Cases, next.to_string(), allowed));
         }
         Ok(series)
+    }
+
+    /// The first failure of every case of a population, by case index.
+    ///
+    /// # Errors
+    /// Damage in the table.
+    pub fn failures(&self, population: usize) -> Result<Vec<Option<Failure>>, Problems> {
+        let cases = self.outline.definition.populations[population].cases;
+        let names = ["case", "status", "failure_message"];
+        let chosen = |name: &str| names.contains(&name);
+        let mut reader = self.reader(TableName::Cases, chosen, population, &(0..cases))?;
+        let statuses: Vec<&str> = schema::statuses().collect();
+        let mut failures = Vec::new();
+        while let Some(batch) = self.next(TableName::Cases, &mut reader)? {
+            self.check_cases(&batch, failures.len() as u64)?;
+            let status = self.words(TableName::Cases, &batch, "status", &statuses)?;
+            let message = batch.column_by_name("failure_message").expect("a column");
+            let message = message.as_string::<i32>();
+            failures.extend(status.iter().zip(message).map(|(status, message)| {
+                let kind = FailureKind::ALL[status.filter(|status| *status > 0)? - 1];
+                Some(Failure::new(kind, message.unwrap_or_default()))
+            }));
+        }
+        Ok(failures)
     }
 
     /// The draws of some cases of a population.
@@ -310,27 +335,36 @@ impl Run {
         Ok(())
     }
 
+    /// A column of words by their indices.
+    fn words(
+        &self,
+        table: TableName,
+        batch: &RecordBatch,
+        name: &str,
+        words: &[&str],
+    ) -> Result<Vec<Option<usize>>, Problems> {
+        let column = batch.column_by_name(name).expect("a column of the registry");
+        let array = column.as_dictionary::<Int32Type>();
+        let known: Vec<Option<usize>> = array
+            .values()
+            .as_string::<i32>()
+            .iter()
+            .map(|word| words.iter().position(|known| Some(*known) == word))
+            .collect();
+        let index = |row: usize| match array.key(row) {
+            None => Ok(None),
+            Some(key) => known.get(key).copied().flatten().map(Some).ok_or_else(|| {
+                let allowed = format!("one of {} in {name}", words.join(", "));
+                self.damage(table, "a word that the run does not know", allowed)
+            }),
+        };
+        (0..batch.num_rows()).map(index).collect()
+    }
+
     fn mode_rows(&self, batch: &RecordBatch) -> Result<Vec<ModeRow>, Problems> {
         let definition = &self.outline.definition;
         let column = |name: &str| batch.column_by_name(name).expect("a column of the registry");
-        let words = |name: &'static str, words: &[&str]| {
-            let array = column(name).as_dictionary::<Int32Type>();
-            let known: Vec<Option<usize>> = array
-                .values()
-                .as_string::<i32>()
-                .iter()
-                .map(|word| words.iter().position(|known| Some(*known) == word))
-                .collect();
-            let index = |row: usize| match array.key(row) {
-                None => Ok(None),
-                Some(key) => known.get(key).copied().flatten().map(Some).ok_or_else(|| {
-                    let found = "a word that the run does not know";
-                    let allowed = format!("one of {} in {name}", words.join(", "));
-                    self.damage(TableName::Modes, found, allowed)
-                }),
-            };
-            (0..batch.num_rows()).map(index).collect::<Result<Vec<_>, _>>()
-        };
+        let words = |name: &str, words: &[&str]| self.words(TableName::Modes, batch, name, words);
         let populations: Vec<&str> =
             definition.populations.iter().map(|p| p.name.as_str()).collect();
         let variants: Vec<&str> = definition.variants.iter().map(|v| v.name.as_str()).collect();
