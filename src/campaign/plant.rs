@@ -76,8 +76,7 @@ fn attachment(engine: &Engine, set: &ModeSet, slope: Slope) -> Result<Attachment
             .map_err(|source| Error::Degenerate { engine: engine.path(), source })?;
             let at = [grid(&first.attach_grid)?, grid(&second.attach_grid)?];
             let slope_of = |mode: &crate::vehicle::Mode| {
-                virtual_grid
-                    .slope(&mode.shape[gimbal], [&mode.shape[at[0]], &mode.shape[at[1]]])
+                virtual_grid.slope(&mode.shape[gimbal], [&mode.shape[at[0]], &mode.shape[at[1]]])
             };
             set.modes.iter().map(slope_of).collect()
         }
@@ -113,9 +112,7 @@ fn case(
             (x, pick(|mode| &mode.shape, station), pick(|mode| &mode.slope, station))
         })
         .collect();
-    let stations: Vec<Station<'_>> = values
-        .iter()
-        .map(|(x_m, shape, slope)| Station { x_m: *x_m, shape, slope })
-        .collect();
+    let stations: Vec<Station<'_>> =
+        values.iter().map(|(x_m, shape, slope)| Station { x_m: *x_m, shape, slope }).collect();
     Ok(case_per_flow(&stations))
 }

@@ -352,9 +352,8 @@ mod tests {
         let mut poles = Vec::new();
         solver.poles(&crossed, &mut poles).expect("solved");
         let mut scratch = Model::zeros(3);
-        let identity =
-            identify(&mut solver, &start, &nominal, &crossed, &poles, 0.5, &mut scratch)
-                .expect("found");
+        let identity = identify(&mut solver, &start, &nominal, &crossed, &poles, 0.5, &mut scratch)
+            .expect("found");
         assert!((identity.primary.reference.pair.pole.im - 1.1).abs() < 1e-3);
         assert!(identity.primary.overlap.norm() > 0.99);
         assert!(identity.partner.is_none());
