@@ -920,6 +920,29 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_antisymmetric_booster_bending_mode_of_the_reference_vehicle_keeps_one_label() {
+        let place = Path::new(env!("CARGO_MANIFEST_DIR")).join("vehicles/sls-like/modes");
+        let modal = read(&place).unwrap();
+        let mut before = 0.0;
+        for set in &modal.sets {
+            let [left, right] =
+                ["left", "right"].map(|side| set.grid(&format!("booster.{side}.gimbal")).unwrap());
+            let z = |mode: &Mode| [mode.shape[left].z, mode.shape[right].z];
+            let antisymmetric = set.modes.iter().filter(|mode| z(mode)[0] * z(mode)[1] < 0.0);
+            let strongest = antisymmetric
+                .filter(|mode| mode.frequency_hz < 7.0)
+                .max_by(|a, b| z(a)[0].abs().total_cmp(&z(b)[0].abs()))
+                .unwrap();
+            assert_eq!(strongest.label, "m006", "at {} s", set.flight_time_s);
+            // Symmetry is exact but for round-off in the solver.
+            assert!((z(strongest)[0] + z(strongest)[1]).abs() <= 1e-9 * z(strongest)[0].abs());
+            // It rises as propellant burns.
+            assert!(strongest.frequency_hz > before);
+            before = strongest.frequency_hz;
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
         #[test]
