@@ -28,6 +28,8 @@ pub struct DrawColumn {
     pub description: String,
     /// Lower and upper end of a bounded law, in the unit of the value.
     pub range: Option<[f64; 2]>,
+    /// Adverse values of the row that its law cannot give.
+    pub beyond: Vec<f64>,
 }
 
 impl DrawColumn {
@@ -41,9 +43,9 @@ impl DrawColumn {
         self.range.map(|[low, high]| (value - low) / (high - low))
     }
 
-    /// Whether `value` lies beyond the range of a bounded law, as a point of an adverse corner may.
+    /// Whether `value` is an adverse value that the law cannot give.
     pub fn outside_law(&self, value: f64) -> bool {
-        self.range.is_some_and(|[low, high]| value < low || value > high)
+        self.beyond.contains(&value)
     }
 }
 

@@ -148,9 +148,9 @@ pub struct Record {
     pub population: usize,
     /// Case index inside the population.
     pub case: u64,
-    /// Drawn value per draw key, in the order of the dispersion's keys.
+    /// Drawn value per draw key, in the order of the dispersion's keys; NaN where it stays nominal.
     pub values: Vec<f64>,
-    /// Normal score Φ⁻¹(F(x)) per draw key.
+    /// Normal score Φ⁻¹(F(x)) per draw key; NaN where it stays nominal or the law cannot give it.
     pub scores: Vec<f64>,
     /// Evaluations ordered by flight time, then variant.
     pub evaluations: Vec<Evaluation>,

@@ -36,7 +36,8 @@ pub struct Run {
     contents: BTreeMap<TableName, Content>,
 }
 
-/// The draws of one stored case; none where the case panicked or a value has no score.
+/// The draws of one stored case; none where a value stays nominal, has no score, or the case
+/// panicked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredDraws {
     /// Drawn value per draw key.

@@ -156,13 +156,13 @@ pub fn cases(outline: &Outline) -> Vec<Column<CaseRow>> {
         });
     }
     for (index, draw) in outline.draws.iter().enumerate() {
-        let description = format!("{}; key {}", draw.description, draw.key);
+        let description = format!("{}; key {}; NULL if nominal", draw.description, draw.key);
         let value = move |r: &CaseRow| r.values.get(index).copied();
         columns.push(Column::number(&draw.column, &draw.unit, description, value));
     }
     for (index, draw) in outline.draws.iter().enumerate() {
         let description =
-            format!("Normal score of {}; NULL for a value beyond its law", draw.column);
+            format!("Normal score of {}; NULL if nominal or beyond its law", draw.column);
         let score = move |r: &CaseRow| r.scores.get(index).copied();
         columns.push(Column::number(draw.score_column(), "sigma", description, score));
     }
@@ -372,13 +372,16 @@ pub fn worst(outline: &Outline) -> Vec<Column<WorstRow>> {
         Column::word("draw", "Draw key, the farthest from nominal first", keys, |r: &WorstRow| {
             r.draw
         }),
-        Column::number("value", "", "Drawn value, in the unit of its column", |r: &WorstRow| {
-            r.value
-        }),
+        Column::number(
+            "value",
+            "",
+            "Drawn value, in the unit of its column; NULL if nominal",
+            |r: &WorstRow| r.value,
+        ),
         Column::number(
             "score_sigma",
             "sigma",
-            "Normal score of the value; NULL for a value beyond its law",
+            "Normal score of the value; NULL if nominal or beyond its law",
             |r: &WorstRow| r.score,
         ),
         Column::number(
@@ -389,7 +392,7 @@ pub fn worst(outline: &Outline) -> Vec<Column<WorstRow>> {
         ),
         Column::flag(
             "outside_law",
-            "Whether the value lies beyond the range of its law",
+            "Whether it is an adverse value that the law cannot give",
             move |r: &WorstRow| outside(r).map(|(draw, value)| draw.outside_law(value)),
         ),
     ]

@@ -153,7 +153,11 @@ pub fn worst(run: &Run, most: usize) -> Result<Vec<WorstRow>, Problems> {
         for row in cases {
             let stored = &draws[&row.case];
             let mut order: Vec<usize> = (0..run.outline().draws.len()).collect();
-            let distance = |draw: &usize| stored.scores[*draw].map_or(f64::INFINITY, f64::abs);
+            let distance = |draw: &usize| match (stored.values[*draw], stored.scores[*draw]) {
+                (None, _) => 0.0,
+                (Some(_), None) => f64::INFINITY,
+                (Some(_), Some(score)) => score.abs(),
+            };
             order.sort_by(|a, b| distance(b).total_cmp(&distance(a)));
             if order.is_empty() {
                 rows.push(row);
