@@ -7,6 +7,7 @@ pub mod results;
 pub mod run;
 pub mod schema;
 pub mod source;
+mod stored;
 pub mod summarise;
 #[cfg(test)]
 mod synthetic;
