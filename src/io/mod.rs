@@ -15,6 +15,7 @@ pub mod scaffold;
 pub mod scenario;
 pub mod schema;
 pub mod source;
+mod stored;
 pub mod summarise;
 #[cfg(test)]
 mod synthetic;
