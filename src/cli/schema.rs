@@ -26,6 +26,8 @@ enum File {
     Dispersion,
     /// A stick model
     Stick,
+    /// Gates
+    Gates,
 }
 
 /// Runs the command.
@@ -38,6 +40,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         File::Run => FileKind::Run,
         File::Dispersion => FileKind::Dispersion,
         File::Stick => FileKind::Stick,
+        File::Gates => FileKind::Gates,
     });
     writeln!(out, "{:#}", schema.as_value())?;
     Ok(PASS)

@@ -326,6 +326,10 @@ fn polish(monic: &[f64; 5], mut root: Complex<f64>) -> Complex<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dynamics::{
+        Attachment, DrawnBody, DrawnEngine, DrawnVehicle, Effects, Layout, Model, Plant,
+    };
+    use nalgebra::{Matrix3x2, Vector3};
     use proptest::prelude::*;
 
     /// The pair of verification case 4.
@@ -536,6 +540,90 @@ mod tests {
         assert!((poles[1].re - (-60.0 + root)).abs() < 1e-12 && poles[1].im == 0.0);
         assert!((poles[2].re + 0.005).abs() < 1e-14 && poles[2].im > 0.0);
         assert_eq!(poles[3], poles[2].conj());
+    }
+
+    /// The three-dimensional model of one engine and one mode, the modal mass
+    /// `1 + m φ² + 2 S φψ + J ψ²` replaced by 1, has the same characteristic polynomial.
+    #[test]
+    fn the_pair_is_the_three_dimensional_model_of_one_engine_and_one_mode() {
+        let (m, r, j, phi, psi) = (8100.0, 0.7, 24_000.0, 2.8e-3, 3.4e-4);
+        let (thrust, flow, length, omega) = (1.2e7, 4700.0, 4.0, 32.7);
+        let (k, c, zeta) = (3.76e7, 5.7e5, 0.005);
+        let body_mass = 4.0e5;
+        // Rotation about +y moves a point aft of the pivot towards −z, so φ lies along −z.
+        let axes = Matrix3x2::from_columns(&[Vector3::y(), Vector3::z()]);
+        let plant = Plant {
+            layout: Layout::new(["m001"], [("one.engine".to_owned(), ["rock", "tilt"], true)]),
+            body_mass_kg: body_mass,
+            attachments: vec![Attachment {
+                thrust_direction: -Vector3::x(),
+                axes,
+                shape: vec![-Vector3::z() * phi],
+                slope: vec![Vector3::y() * psi],
+                case_per_flow: Vec::new(),
+                in_modes: false,
+            }],
+        };
+        let drawn = DrawnVehicle {
+            body: DrawnBody { frequency_rad_s: vec![omega], damping_ratio: vec![zeta] },
+            engines: vec![DrawnEngine {
+                thrust_n: thrust,
+                mass_flow_kg_s: flow,
+                mass_kg: m,
+                cg_m: r,
+                inertia_kg_m2: j,
+                axial_inertia_kg_m2: 1.5e4,
+                length_m: length,
+                gimbal_stiffness_n_m_rad: [k; 2],
+                gimbal_damping_n_m_s_rad: [c; 2],
+                shape_gain: vec![1.0],
+                slope_gain: vec![1.0],
+            }],
+        };
+        // The mean acceleration stiffens the gimbal by m g0 r, g0 = R/M.
+        let stiffness = k + m * r * thrust / (body_mass + m);
+        let omega_n = (stiffness / j).sqrt();
+        for nozzle_jet in [NozzleJet::Off, NozzleJet::Linear, NozzleJet::RigidNozzle] {
+            let effects = Effects {
+                thrust: 1.0,
+                case_jet_damping: false,
+                nozzle_jet_damping: nozzle_jet,
+                follower_thrust: false,
+            };
+            let mut model = Model::zeros(plant.layout.coordinates());
+            plant.assemble(&drawn, &effects, &mut model);
+            let planar = Planar::new(Parameters {
+                inertia_kg_m2: j,
+                actuator_damping_ratio: c / (2.0 * j * omega_n),
+                actuator_omega_rad_s: omega_n,
+                mode_damping_ratio: zeta,
+                mode_omega_rad_s: omega,
+                coupling: j * psi + m * r * phi,
+                shape: phi,
+                slope: psi,
+                thrust_n: thrust,
+                nozzle_jet,
+                mass_flow_kg_s: flow,
+                nozzle_length_m: length,
+            })
+            .unwrap();
+            for s in [Complex::new(-0.3, 33.0), Complex::new(2.0, 20.0), Complex::new(-9.0, 0.0)] {
+                let entry = |a: usize, b: usize| {
+                    let mass = if (a, b) == (0, 0) { 1.0 } else { model.mass[(a, b)] };
+                    s * s * mass + s * model.damping[(a, b)] + model.stiffness[(a, b)]
+                };
+                // The mode does not move the second gimbal axis.
+                assert!(entry(0, 2).norm() < 1e-9 * entry(0, 1).norm());
+                let full = entry(0, 0) * entry(1, 1) - entry(0, 1) * entry(1, 0);
+                let quartic =
+                    planar.quartic().iter().rev().fold(Complex::<f64>::ZERO, |p, a| p * s + a);
+                // Sums of a dozen products of a few rounded factors each, which nearly cancel.
+                let terms = planar.quartic().into_iter().zip(0..);
+                let size: f64 = terms.map(|(a, i)| a.abs() * s.norm().powi(i)).sum();
+                let error = (full - quartic).norm() / size;
+                assert!(error < 64.0 * f64::EPSILON, "{nozzle_jet:?} {s}: {error}");
+            }
+        }
     }
 
     proptest! {

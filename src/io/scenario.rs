@@ -5,6 +5,7 @@
 use super::{files, package};
 use crate::campaign::Definition;
 use crate::dispersion::Dispersion;
+use crate::gate;
 use crate::problem::Problems;
 use crate::scenario::run_file::RunFile;
 use crate::scenario::vehicle_file::VehicleFile;
@@ -62,7 +63,7 @@ pub fn vehicle(path: &Path) -> Result<LoadedVehicle, Problems> {
 /// Reads a run and everything it names.
 ///
 /// # Errors
-/// All problems of the run file, the vehicle, the modal package and the dispersion table.
+/// All problems of the run file, the vehicle, the modal package, the dispersion table and the gates.
 pub fn load(path: &Path) -> Result<Loaded, Problems> {
     let name = files::name(path);
     let text = files::read_text(path)?;
@@ -83,10 +84,12 @@ pub fn load(path: &Path) -> Result<Loaded, Problems> {
         };
         Ok((dispersion, (name, text)))
     });
-    let gates = raw.gates.as_ref().map(|gates| beside(path, gates));
-    if let Some(gates) = gates.as_ref().filter(|gates| !gates.is_file()) {
-        findings.push("gates", format!("{}, which is no file", gates.display()), "a gate file");
-    }
+    let gates = raw.gates.as_ref().and_then(|gates| {
+        named(path, gates, "gates", &mut findings, |file| {
+            gate::parse(&files::read_text(file)?, &files::name(file))?;
+            Ok(file.to_owned())
+        })
+    });
     let (dispersion, dispersion_text) = dispersion.unzip();
     let dispersion = dispersion.flatten();
     let stem = path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy().into_owned());
@@ -134,4 +137,89 @@ fn named<T>(
 /// `path` relative to the folder of `file`; an absolute path as it is.
 fn beside(file: &Path, path: &str) -> PathBuf {
     file.parent().unwrap_or(Path::new("")).join(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{files, scaffold};
+    use super::*;
+    use crate::problem::Kind;
+
+    /// A scaffold whose file `name` has the first `from` replaced by `to`.
+    fn edited(name: &str, from: &str, to: &str) -> (tempfile::TempDir, PathBuf) {
+        let place = tempfile::tempdir().unwrap();
+        let study = place.path().join("study");
+        scaffold::write(&study).unwrap();
+        edit(&study.join(name), from, to);
+        (place, study)
+    }
+
+    fn edit(path: &Path, from: &str, to: &str) {
+        let text = files::read_text(path).unwrap();
+        assert!(text.contains(from), "{from}");
+        files::write(path, text.replacen(from, to, 1).as_bytes()).unwrap();
+    }
+
+    fn problems(study: &Path) -> Problems {
+        load(&study.join("runs/reference.toml")).expect_err("a problem")
+    }
+
+    #[test]
+    fn a_run_loads_with_the_texts_of_its_files_and_a_vehicle_by_folder_or_file() {
+        let (_place, study) = edited("runs/smoke.toml", "sls-like\"", "sls-like/vehicle.toml\"");
+        let loaded = load(&study.join("runs/smoke.toml")).unwrap();
+        assert_eq!(loaded.definition.name, "smoke");
+        assert_eq!(loaded.texts.len(), 3);
+        for (name, text) in &loaded.texts {
+            assert_eq!(&files::read_text(Path::new(name)).unwrap(), text);
+        }
+        let by_folder = vehicle(&study.join("vehicles/sls-like")).unwrap();
+        assert!(by_folder.text.1 == loaded.texts[1].1);
+        let reference = load(&study.join("runs/reference.toml")).unwrap();
+        assert!(reference.gates.unwrap().ends_with("reference.gates.toml"));
+    }
+
+    #[test]
+    fn problems_of_all_files_of_a_run_are_reported_at_once() {
+        let (_place, study) = edited("runs/reference.toml", "cases = 2000", "cases = -1");
+        edit(&study.join("vehicles/sls-like/vehicle.toml"), "mass_kg = 8100.0", "mass_kg = -1.0");
+        edit(&study.join("dispersions/reference.toml"), "apply = ", "aply = ");
+        edit(&study.join("runs/reference.gates.toml"), "statistic = ", "statistik = ");
+        let problems = problems(&study);
+        let places: Vec<(bool, &str)> = problems
+            .0
+            .iter()
+            .map(|p| (p.file.ends_with("reference.toml"), p.key.as_str()))
+            .collect();
+        assert!(places.contains(&(true, "cases")), "{places:?}");
+        assert!(places.contains(&(false, "engine[0].nozzle.mass_kg")), "{places:?}");
+        assert!(places.contains(&(true, "row[0].aply")), "{places:?}");
+        assert!(problems.0.iter().any(|p| p.file.ends_with("gates.toml")), "{problems}");
+        assert_eq!(problems.kind(), Kind::Input);
+    }
+
+    #[test]
+    fn a_file_that_does_not_exist_is_named_where_it_is_asked_for() {
+        for (key, from) in [
+            ("vehicle", "../vehicles/sls-like"),
+            ("dispersion", "../dispersions/reference.toml"),
+            ("gates", "reference.gates.toml"),
+        ] {
+            let (_place, study) = edited("runs/reference.toml", from, "nowhere.toml");
+            let problems = problems(&study);
+            assert_eq!((problems.0.len(), problems.0[0].key.as_str()), (1, key), "{problems}");
+        }
+        assert!(load(Path::new("no/such/run.toml")).is_err());
+    }
+
+    #[test]
+    fn a_damaged_package_is_damage_and_an_absent_one_is_input() {
+        let (_place, study) = edited("runs/smoke.toml", "seed = 1", "seed = 2");
+        let shapes = study.join("vehicles/sls-like/modes/tables/shapes.parquet");
+        files::write(&shapes, b"PAR1 cut short").unwrap();
+        assert_eq!(problems(&study).kind(), Kind::Damage);
+        let (_place, study) = edited("vehicles/sls-like/vehicle.toml", "\"modes\"", "\"moods\"");
+        let problems = problems(&study);
+        assert_eq!((problems.kind(), problems.0[0].key.as_str()), (Kind::Input, "modal_package"));
+    }
 }

@@ -12,7 +12,8 @@ pub fn label() -> String {
     table["named_mode"][0]["labels"][0].as_str().unwrap().into()
 }
 
-/// Modes with the grids of the reference vehicle at its flight times: one mode of 5.2 Hz.
+/// Modes with the grids of the reference vehicle at its flight times: the named mode at 5.2 Hz
+/// between two others.
 pub fn modal() -> Modal {
     let mut points: Vec<(String, [f64; 3])> = Vec::new();
     for (side, y) in [("left", -6.35), ("right", 6.35_f64)] {
@@ -43,12 +44,13 @@ pub fn modal() -> Modal {
         })
         .collect();
     let count = grids.len();
-    let mode = Mode {
-        label: label(),
-        frequency_hz: 5.2,
+    let mode = |label: &str, frequency_hz| Mode {
+        label: label.into(),
+        frequency_hz,
         shape: vec![Vector3::zeros(); count],
         slope: vec![Vector3::zeros(); count],
     };
+    let modes = vec![mode("below", 4.0), mode(&label(), 5.2), mode("above", 12.0)];
     let body =
         MassProperties { mass_kg: 1e6, cg_m: Vector3::zeros(), inertia_kg_m2: Matrix3::identity() };
     let sets = [80.0, 90.0, 95.0, 100.0, 105.0, 110.0, 112.0, 114.0]
@@ -56,7 +58,7 @@ pub fn modal() -> Modal {
             flight_time_s,
             body,
             grids: grids.clone(),
-            modes: vec![mode.clone()],
+            modes: modes.clone(),
         })
         .to_vec();
     Modal { source: "test".into(), contains_engines: Vec::new(), sets, parents: Vec::new() }

@@ -18,12 +18,12 @@ pub struct Corner {
     pub population: usize,
     /// Name, for messages.
     pub name: String,
+    /// Indices of the draws that stand at one of their `worst` values, ascending.
+    pub draws: Vec<usize>,
     /// Index of the mode whose damping is made least.
     pub mode: usize,
     /// Index of the variant in which it is made least.
     pub variant: usize,
-    /// Indices of the draws whose sides are chosen.
-    pub draws: Vec<usize>,
 }
 
 /// A validated run: its definition, and the corners whose signs are still to be evaluated.
@@ -196,58 +196,50 @@ fn given(
             f.push(format!("{key}.{name}"), format!("\"{value}\""), allowed);
         }
     }
-    if !corner.keys.is_empty() {
-        let found = format!("{} entries", corner.keys.len());
+    if let Some(keys) = &corner.keys {
+        let found = format!("{} entries", keys.len());
         f.push(format!("{key}.keys"), found, "nothing, or signs = \"evaluated\"");
     }
     if corner.low.is_empty() && corner.high.is_empty() {
         f.push(key, "neither `low` nor `high`", "at least one entry in `low` or `high`");
     }
     let Some(dispersion) = dispersion else { return Vec::new() };
-    let mut sides: Vec<Option<usize>> = vec![None; dispersion.draws().len()];
-    for (side, (list, entries)) in [("low", &corner.low), ("high", &corner.high)].iter().enumerate()
-    {
-        for (i, entry) in entries.iter().enumerate() {
-            let place = format!("{key}.{list}[{i}]");
-            let mut twice = Vec::new();
-            matching(entry, &place, dispersion, f, |draw| {
-                if sides[draw].is_some_and(|other| other != side) {
-                    twice.push(draw);
-                }
-                sides[draw] = Some(side);
-            });
-            for draw in twice {
-                let found = format!("\"{}\", which is in `low` as well", dispersion.draws()[draw].key);
-                f.push(&place, found, "each key on one side");
-            }
-        }
+    let low = matching(dispersion, &corner.low, &format!("{key}.low"), f);
+    let high = matching(dispersion, &corner.high, &format!("{key}.high"), f);
+    let both: Vec<usize> = low.iter().copied().filter(|i| high.contains(i)).collect();
+    if let Some(&first) = both.first() {
+        let key_of = &dispersion.draws()[first].key;
+        let found = format!("{} keys that are in `low` as well, first \"{key_of}\"", both.len());
+        f.push(format!("{key}.high"), found, "each key on one side");
     }
-    let values = dispersion.draws().iter().zip(sides).enumerate();
-    values.filter_map(|(i, (draw, side))| Some((i, draw.worst?[side?]))).collect()
+    let side = |side: usize| move |i: usize| Some((i, dispersion.draws()[i].worst?[side]));
+    let mut fixed: Vec<(usize, f64)> = low.into_iter().filter_map(side(0)).collect();
+    fixed.extend(high.into_iter().filter_map(side(1)));
+    fixed.sort_by_key(|(index, _)| *index);
+    fixed
 }
 
-/// Hands every draw that has `worst` values and that `entry` means (a whole key, or a parameter path
-/// with `*`) to `take`; none at all is a problem at `place`.
+/// Indices of the draws with `worst` values that `entries` name, ascending; an entry is a whole
+/// key or a pattern of its parameter path.
 fn matching(
-    entry: &str,
-    place: &str,
     dispersion: &Dispersion,
+    entries: &[String],
+    place: &str,
     f: &mut Findings,
-    mut take: impl FnMut(usize),
-) {
-    let mut matched = false;
-    for (index, draw) in dispersion.draws().iter().enumerate() {
-        let path = draw.key.split(" @ ").next().unwrap_or(&draw.key);
-        if draw.worst.is_some() && (draw.key == entry || pattern::matches(entry, path)) {
-            matched = true;
-            take(index);
+) -> Vec<usize> {
+    let names = |entry: &str, key: &str| {
+        key == entry || pattern::matches(entry, key.split(" @ ").next().unwrap_or(key))
+    };
+    let adverse = || dispersion.draws().iter().enumerate().filter(|(_, d)| d.worst.is_some());
+    for (i, entry) in entries.iter().enumerate() {
+        if !adverse().any(|(_, draw)| names(entry, &draw.key)) {
+            let allowed = allowed_instead(entry, adverse().map(|(_, d)| d.key.as_str()));
+            let found = format!("\"{entry}\", which matches no draw key with `worst` values");
+            f.push(format!("{place}[{i}]"), found, allowed);
         }
     }
-    if !matched {
-        let known = dispersion.draws().iter().filter(|d| d.worst.is_some());
-        let allowed = allowed_instead(entry, known.map(|d| d.key.as_str()));
-        f.push(place, format!("\"{entry}\", which matches no draw key with `worst` values"), allowed);
-    }
+    let chosen = adverse().filter(|(_, draw)| entries.iter().any(|e| names(e, &draw.key)));
+    chosen.map(|(i, _)| i).collect()
 }
 
 /// A corner whose signs are evaluated.
@@ -278,17 +270,19 @@ fn evaluated(
     let mode = index("mode", &corner.mode, modes);
     let variants = file.variant.iter().map(|v| v.name.as_str()).collect();
     let variant = index("variant", &corner.variant, variants);
-    let mut chosen = vec![false; dispersion.map_or(0, |d| d.draws().len())];
-    if let Some(dispersion) = dispersion {
-        for (i, entry) in corner.keys.iter().enumerate() {
-            matching(entry, &format!("{key}.keys[{i}]"), dispersion, f, |draw| chosen[draw] = true);
+    let dispersion = dispersion?;
+    let draws = match &corner.keys {
+        Some(entries) => matching(dispersion, entries, &format!("{key}.keys"), f),
+        None => {
+            let all = dispersion.draws().iter().enumerate();
+            all.filter(|(_, d)| d.worst.is_some()).map(|(i, _)| i).collect()
         }
-        if corner.keys.is_empty() {
-            for (chosen, draw) in chosen.iter_mut().zip(dispersion.draws()) {
-                *chosen = draw.worst.is_some();
-            }
-        }
+    };
+    if draws.is_empty() {
+        f.push(key, "no draw key with `worst` values", "at least one");
     }
-    let draws = chosen.iter().enumerate().filter_map(|(i, chosen)| chosen.then_some(i)).collect();
-    Some(Corner { population, name: corner.name.clone(), mode: mode?, variant: variant?, draws })
+    Some(Corner { population, name: corner.name.clone(), draws, mode: mode?, variant: variant? })
 }
+
+#[cfg(test)]
+mod tests;

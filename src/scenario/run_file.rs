@@ -128,10 +128,9 @@ pub struct CornerFile {
     /// With signs = "given": keys at their high value.
     #[serde(default)]
     pub high: Vec<String>,
-    /// With signs = "evaluated": keys whose side is chosen, by parameter path, with `*`, or whole
-    /// key; all keys with `worst` values if left out.
-    #[serde(default)]
-    pub keys: Vec<String>,
+    /// With signs = "evaluated": keys that stand at a `worst` value, by parameter path, with `*`,
+    /// or whole key (default: every key that has `worst` values). The others are drawn.
+    pub keys: Option<Vec<String>>,
     /// With signs = "evaluated": the mode whose damping is made least.
     pub mode: Option<String>,
     /// With signs = "evaluated": the variant in which it is made least.

@@ -118,7 +118,9 @@ impl<'a> Resolver<'a> {
         let zero = vec![0.0; count];
         let burned = file.burned_fraction.as_ref().unwrap_or(&zero);
         let mut good = names::ascending(self.findings, &format!("{key}.time_s"), &file.time_s);
-        let tables: [(&str, &[f64], fn(f64) -> bool, &str); 3] = [
+        /// Key, values, what holds for each, and that in words.
+        type Table<'a> = (&'a str, &'a [f64], fn(f64) -> bool, &'a str);
+        let tables: [Table; 3] = [
             ("thrust_n", &file.thrust_n, |x| x > 0.0, "numbers > 0"),
             ("mass_flow_kg_s", &file.mass_flow_kg_s, |x| x >= 0.0, "numbers ≥ 0"),
             ("burned_fraction", burned, |x| (0.0..=1.0).contains(&x), "numbers from 0 to 1"),

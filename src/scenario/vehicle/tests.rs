@@ -295,7 +295,7 @@ fn names_are_words_and_unique() {
 fn a_named_mode_needs_labels_of_the_package() {
     let mut modal = modal();
     for set in &mut modal.sets {
-        set.modes[0].label = "other".into();
+        set.modes[1].label = "other".into();
     }
     modal.parents.push(Parent {
         flight_time_s: 80.0,

@@ -1,0 +1,185 @@
+//! Tests of the run: the reference runs, and everything that can be wrong with one.
+
+use super::super::fixture::{VEHICLE, modal};
+use super::super::vehicle_file::VehicleFile;
+use super::super::{dispersion, table, vehicle};
+use super::*;
+use proptest::prelude::*;
+
+const REFERENCE: &str = include_str!("../../../runs/reference.toml");
+const DISPERSION: &str = include_str!("../../../dispersions/reference.toml");
+
+fn vehicle() -> Resolved {
+    let (file, findings) = table::read::<VehicleFile>("vehicle.toml", VEHICLE).unwrap();
+    vehicle::resolve(&file, Some(modal()), findings).unwrap()
+}
+
+fn read(text: &str) -> Result<(Run, Dispersion), Problems> {
+    let vehicle = vehicle();
+    let dispersion = dispersion::read("d.toml", DISPERSION, &vehicle.vehicle)?;
+    let (file, findings) = table::read::<RunFile>("run.toml", text)?;
+    let run = resolve(&file, "reference", Some(&vehicle), Some(&dispersion), findings)?;
+    Ok((run, dispersion))
+}
+
+/// The reference run with the first `from` replaced by `to`.
+fn edited(from: &str, to: &str) -> String {
+    assert!(REFERENCE.contains(from), "{from}");
+    REFERENCE.replacen(from, to, 1)
+}
+
+fn keys(text: &str) -> Vec<String> {
+    read(text).expect_err("a problem").0.into_iter().map(|p| p.key).collect()
+}
+
+/// The reference run with a corner of given signs instead of its own.
+fn with_given(lists: &str) -> String {
+    let cut = REFERENCE.find("[[corner]]").unwrap();
+    format!("{}[[corner]]\nname = \"soft\"\nsigns = \"given\"\n{lists}\n", &REFERENCE[..cut])
+}
+
+#[test]
+fn the_reference_run_holds_what_the_reference_vehicle_page_asks_for() {
+    let (Run { definition, corners }, dispersion) = read(REFERENCE).unwrap();
+    assert_eq!(definition.flight_times_s, [80.0, 95.0, 100.0, 105.0, 110.0, 112.0, 114.0]);
+    assert_eq!(definition.gimballed, [true, true, false, false, false, false]);
+    let names: Vec<&str> = definition.variants.iter().map(|v| v.name.as_str()).collect();
+    assert_eq!(names, ["no_jet_damping", "case_only", "nozzle_only", "jet_damping", "thrust_off"]);
+    assert!(!definition.variants[4].thrust && definition.variants[3].thrust);
+    assert_eq!(definition.variants[3].nozzle_jet_damping, NozzleJet::Linear);
+    let populations: Vec<(&str, u64, bool)> =
+        definition.populations.iter().map(|p| (p.name.as_str(), p.cases, p.drawn)).collect();
+    let expected = [
+        ("nominal", 1, false),
+        ("dispersed", 2000, true),
+        ("adverse", 1, false),
+        ("adverse_dispersed", 2000, true),
+    ];
+    assert_eq!(populations, expected);
+    assert_eq!((corners[0].population, corners[0].mode, corners[0].variant), (2, 0, 3));
+    let fixed =
+        |part: &str| corners[0].draws.iter().any(|i| dispersion.draws()[*i].key.contains(part));
+    assert!(fixed(".damping") && fixed("nozzle.ablation") && fixed("booster.*.thrust @ vehicle"));
+    assert!(!fixed("frequency") && !fixed(".stiffness") && !fixed("slope"));
+}
+
+#[test]
+fn what_a_run_leaves_out_has_stated_defaults() {
+    let text = "vehicle = \"v\"\ndispersion = \"d\"\ncases = 3\nseed = 0\nmodes = [\"tvse\"]\n\
+        [[variant]]\nname = \"a\"\ncase_jet_damping = true\nnozzle_jet_damping = \"rigid-nozzle\"\n";
+    let (Run { definition, corners }, _) = read(text).unwrap();
+    assert_eq!(definition.flight_times_s, vehicle().flight_times_s);
+    assert_eq!(definition.gimballed, [true; 6]);
+    assert_eq!(definition.exchange_ratio, 0.5);
+    let variant = &definition.variants[0];
+    assert!(variant.thrust && !variant.follower_thrust && variant.slope == Slope::VirtualGrid);
+    assert_eq!(variant.nozzle_jet_damping, NozzleJet::RigidNozzle);
+    assert!(corners.is_empty() && definition.populations.len() == 2);
+}
+
+#[test]
+fn a_corner_of_given_signs_holds_the_worst_values_of_its_keys() {
+    let text = with_given(
+        "cases = 10\nlow = [\"modes.*.damping\"]\nhigh = [\"booster.*.thrust @ vehicle\"]",
+    );
+    let (Run { definition, corners }, dispersion) = read(&text).unwrap();
+    assert!(corners.is_empty());
+    let [_, _, corner, around] = definition.populations.as_slice() else { panic!() };
+    assert_eq!(corner.fixed, around.fixed);
+    let values: Vec<(&str, f64)> =
+        corner.fixed.iter().map(|(i, v)| (dispersion.draws()[*i].key.as_str(), *v)).collect();
+    let expected = [
+        ("booster.*.thrust @ vehicle", 1.05),
+        ("modes.above.damping @ mode", 0.0025),
+        ("modes.below.damping @ mode", 0.0025),
+        ("modes.m006.damping @ mode", 0.0025),
+    ];
+    assert_eq!(values, expected);
+}
+
+#[test]
+fn single_wrong_entries_are_named() {
+    for (from, to, key) in [
+        ("cases = 2000", "cases = 0", "cases"),
+        ("cases = 2000", "cases = 2.5", "cases"),
+        ("seed = 2013", "seed = -2013", "seed"),
+        ("flight_times_s = [80.0,", "flight_times_s = [81.0,", "flight_times_s[0]"),
+        ("flight_times_s = [80.0,", "flight_times_s = [120.0,", "flight_times_s[1]"),
+        ("modes = [\"tvse\"]", "modes = [\"tvs\"]", "modes[0]"),
+        ("modes = [\"tvse\"]", "modes = []", "modes"),
+        ("modes = [\"tvse\"]", "modes = [\"tvse\", \"tvse\"]", "modes[1]"),
+        ("gimballed = [\"booster.*\"]", "gimballed = [\"boosters.*\"]", "gimballed[0]"),
+        ("exchange_ratio = 0.5", "exchange_ratio = 1.5", "identity.exchange_ratio"),
+        ("name = \"case_only\"", "name = \"case only\"", "variant[1].name"),
+        ("name = \"case_only\"", "name = \"nozzle_only\"", "variant[2].name"),
+        (
+            "nozzle_jet_damping = \"off\"",
+            "nozzle_jet_damping = \"equation-12\"",
+            "variant[0].nozzle_jet_damping",
+        ),
+        (
+            "nozzle_jet_damping = \"off\"",
+            "nozle_jet_damping = \"off\"",
+            "variant[0].nozle_jet_damping",
+        ),
+        ("name = \"adverse\"", "name = \"dispersed\"", "corner[0].name"),
+        ("mode = \"tvse\"", "mode = \"bending\"", "corner[0].mode"),
+        ("variant = \"jet_damping\"", "variant = \"jets\"", "corner[0].variant"),
+        ("variant = \"jet_damping\"", "", "corner[0].variant"),
+        ("\"modes.*.damping\"", "\"modes.*.dumping\"", "corner[0].keys[0]"),
+        (
+            "signs = \"evaluated\"",
+            "signs = \"evaluated\"\nlow = [\"modes.*.damping\"]",
+            "corner[0].low",
+        ),
+        ("signs = \"evaluated\"", "signs = \"guessed\"", "corner[0].signs"),
+    ] {
+        let found = keys(&edited(from, to));
+        // A time that is not ascending is also no time of the vehicle.
+        assert!(found.contains(&key.to_string()) && found.len() <= 2, "{to}: {found:?}");
+    }
+}
+
+#[test]
+fn a_corner_of_given_signs_is_checked_entry_by_entry() {
+    for (lists, key) in [
+        ("low = [\"modes.*.dumping\"]", "corner[0].low[0]"),
+        ("low = [\"modes.*.damping\"]\nhigh = [\"modes.*.*\"]", "corner[0].high"),
+        ("low = []", "corner[0]"),
+        ("low = [\"modes.*.damping\"]\nmode = \"tvse\"", "corner[0].mode"),
+        ("low = [\"modes.*.damping\"]\nkeys = [\"modes.*.damping\"]", "corner[0].keys"),
+    ] {
+        assert_eq!(keys(&with_given(lists)), [key], "{lists}");
+    }
+}
+
+#[test]
+fn a_mode_without_a_label_at_a_flight_time_is_refused() {
+    let mut vehicle = vehicle();
+    for set in vehicle.vehicle.modal.sets.iter_mut().filter(|s| s.flight_time_s == 112.0) {
+        set.modes[1].label = "m099".into();
+    }
+    let (file, findings) = table::read::<RunFile>("run.toml", REFERENCE).unwrap();
+    let problems = resolve(&file, "r", Some(&vehicle), None, findings).expect_err("a problem").0;
+    assert_eq!((problems.len(), problems[0].key.as_str()), (1, "modes[0]"));
+    assert!(problems[0].found.contains("112 s"), "{problems:?}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_damage_to_the_text_makes_the_reader_panic(
+        edits in proptest::collection::vec((0.0..1.0_f64, 0_usize..40, "[a-z0-9.\\[\\]=\"\n -]{0,6}"), 1..4)
+    ) {
+        let mut text: Vec<char> = REFERENCE.chars().collect();
+        for (place, length, put) in edits {
+            let from = (place * text.len() as f64) as usize;
+            let to = (from + length).min(text.len());
+            text.splice(from..to, put.chars());
+        }
+        let text: String = text.into_iter().collect();
+        // Only that it returns counts here; what it finds is tested above.
+        let _ = read(&text);
+    }
+}
