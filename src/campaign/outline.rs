@@ -29,17 +29,21 @@ pub struct DrawColumn {
     pub description: String,
     /// Lower and upper end of a bounded law, in the unit of the value.
     pub range: Option<[f64; 2]>,
+    /// Adverse values of the row that its law cannot give.
+    pub beyond: Vec<f64>,
 }
 
 impl DrawColumn {
     /// The description of a draw of a dispersion.
     pub fn of(draw: &Draw) -> Self {
+        let worst = draw.worst.into_iter().flatten();
         Self {
             key: draw.key.clone(),
             column: draw.column.clone(),
             unit: draw.unit.to_owned(),
             description: draw.description.to_owned(),
             range: draw.law.range(),
+            beyond: worst.filter(|value| draw.law.is_outside(*value)).collect(),
         }
     }
 
@@ -53,9 +57,9 @@ impl DrawColumn {
         self.range.map(|[low, high]| (value - low) / (high - low))
     }
 
-    /// Whether `value` lies beyond the range of a bounded law, as a point of an adverse corner may.
+    /// Whether `value` is an adverse value that the law cannot give.
     pub fn outside_law(&self, value: f64) -> bool {
-        self.range.is_some_and(|[low, high]| value < low || value > high)
+        self.beyond.contains(&value)
     }
 }
 

@@ -148,9 +148,10 @@ pub struct Record {
     pub population: usize,
     /// Case index inside the population.
     pub case: u64,
-    /// Drawn value per draw key, in the order of the dispersion's keys; `None` for one left nominal.
+    /// Drawn value per draw key, in the order of the dispersion's keys; `None` where it stays nominal.
     pub values: Vec<Option<f64>>,
-    /// Normal score Φ⁻¹(F(x)) per draw key; `None` for a value that was not drawn or lies outside its law.
+    /// Normal score Φ⁻¹(F(x)) per draw key; `None` where it stays nominal or the law cannot
+    /// give it.
     pub scores: Vec<Option<f64>>,
     /// Evaluations ordered by flight time, then variant.
     pub evaluations: Vec<Evaluation>,

@@ -13,9 +13,9 @@ pub struct CaseRow {
     pub population: usize,
     /// Case index inside the population.
     pub case: u64,
-    /// Drawn value per draw key; empty if the case panicked.
+    /// Drawn value per draw key, NaN where it stays nominal; empty if the case panicked.
     pub values: Vec<Option<f64>>,
-    /// Normal score per draw key; empty if the case panicked.
+    /// Normal score per draw key, NaN where there is none; empty if the case panicked.
     pub scores: Vec<Option<f64>>,
     /// What the scalar metrics are taken from.
     pub reduced: ReducedCase,

@@ -66,14 +66,13 @@ impl Series {
 
     /// Takes in a pole of a case; of several, the less stable one stays.
     pub fn add(&mut self, case: usize, damping_ratio: f64, frequency_hz: f64, pole_re_rad_s: f64) {
-        // False for NaN: the first pole of a case.
-        if !(self.damping_ratio[case] <= damping_ratio) {
+        let known = self.damping_ratio[case];
+        if known.is_nan() || damping_ratio < known {
             self.damping_ratio[case] = damping_ratio;
             self.frequency_hz[case] = frequency_hz;
         }
-        if !(self.pole_re_rad_s[case] >= pole_re_rad_s) {
-            self.pole_re_rad_s[case] = pole_re_rad_s;
-        }
+        // Of NaN and a number, the number.
+        self.pole_re_rad_s[case] = self.pole_re_rad_s[case].max(pole_re_rad_s);
     }
 
     /// Sets the gain of damping ratio over the first variant, case by case.
@@ -153,10 +152,9 @@ pub fn summarise(group: Group, drawn: bool, series: &Series) -> Result<SummaryRo
         damping_ratio: spread(damping)?,
         frequency_hz_mean: Moments::of(&frequency)?.mean(),
         time_to_double_min_s: (re_max > 0.0).then(|| LN_2 / re_max),
-        damping_ratio_gain: match Moments::of(&gain)?.mean() {
-            Some(mean) => Some([gain.iter().copied().fold(f64::INFINITY, f64::min), mean]),
-            None => None,
-        },
+        damping_ratio_gain: Moments::of(&gain)?
+            .mean()
+            .map(|mean| [gain.iter().copied().fold(f64::INFINITY, f64::min), mean]),
     })
 }
 

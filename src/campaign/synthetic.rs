@@ -39,11 +39,12 @@ pub fn definition(cases: &[u64]) -> Definition {
 
 /// The outline of a synthetic run.
 pub fn outline(cases: &[u64], poles: StoredPoles) -> Outline {
-    let draw = |key: &str, column: &str, unit: &str, range| DrawColumn {
+    let draw = |key: &str, column: &str, unit: &str, range: Option<[f64; 2]>| DrawColumn {
         key: key.to_owned(),
         column: column.to_owned(),
         unit: unit.to_owned(),
         description: format!("Draw of {key}"),
+        beyond: if range.is_some() { vec![0.0025] } else { Vec::new() },
         range,
     };
     let draws = vec![

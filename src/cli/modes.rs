@@ -127,6 +127,8 @@ mod tests {
         let late = run_line(&["modes", stick, "-o", "never", "--times", "900"]).unwrap_err();
         assert!(late.to_string().contains("900 s"), "{late}");
         assert_eq!(late.code(), crate::cli::USAGE);
+        let words = ["modes", stick, "-o", "never", "--max-hz", "0.1"];
+        assert!(run_line(&words).unwrap_err().to_string().contains("no elastic mode"));
         let none = run_line(&["modes", "no-such.toml", "-o", "never"]).unwrap_err();
         assert_eq!(none.code(), crate::cli::USAGE);
         assert!(!std::path::Path::new("never").exists());

@@ -11,6 +11,7 @@ use arrow::datatypes::{DataType, Field, Int32Type};
 use std::sync::Arc;
 
 type Take<R, T> = Box<dyn Fn(&R) -> Option<T> + Send>;
+type TakeText<R> = Box<dyn Fn(&R) -> Option<&str> + Send>;
 
 /// How the value of a column is taken from a row.
 pub enum Get<R> {
@@ -23,7 +24,7 @@ pub enum Get<R> {
     /// One of a fixed list of words, by its index.
     Word(Vec<String>, Take<R, usize>),
     /// Free text.
-    Text(Box<dyn Fn(&R) -> Option<&str> + Send>),
+    Text(TakeText<R>),
 }
 
 /// A column of a table with rows of type `R`.

@@ -14,6 +14,8 @@ pub mod run;
 pub mod scaffold;
 pub mod scenario;
 pub mod schema;
+pub mod source;
+mod stored;
 pub mod summarise;
 #[cfg(test)]
 mod synthetic;

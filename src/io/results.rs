@@ -372,6 +372,20 @@ mod tests {
     }
 
     #[test]
+    fn a_folder_that_vanishes_ends_the_run_with_a_problem() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = folder.path().join("run");
+        let outline = cases::outline(&[1], StoredPoles::Named);
+        let definition = outline.definition.clone();
+        let mut results = Results::create(&run, outline).unwrap();
+        results.push(cases::record(&definition, 0, 0)).unwrap();
+        fs::remove_dir_all(&run).unwrap();
+        let problems = results.finish(1, 3).unwrap_err();
+        assert_eq!(problems.kind(), Kind::Input);
+        assert!(problems.to_string().contains("cases.parquet"), "{problems}");
+    }
+
+    #[test]
     fn a_draw_whose_column_no_reader_accepts_is_a_problem_before_the_first_case() {
         let folder = tempfile::tempdir().unwrap();
         let run = folder.path().join("run");

@@ -6,14 +6,13 @@ use super::files;
 use super::manifest::Manifest;
 use super::schema::{self, TableName};
 use super::table::Content;
-use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
+use crate::campaign::record::{Failure, FailureKind};
 use crate::campaign::row::ModeRow;
 use crate::campaign::{Outline, Population};
 use crate::problem::{Kind, Problems};
 use arrow::array::{Array, AsArray};
-use arrow::datatypes::{DataType, Field, Float64Type, Int32Type, Int64Type};
+use arrow::datatypes::{DataType, Field, Float64Type, Int64Type};
 use arrow::record_batch::RecordBatch;
-use nalgebra::Complex;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use std::collections::BTreeMap;
@@ -36,7 +35,8 @@ pub struct Run {
     contents: BTreeMap<TableName, Content>,
 }
 
-/// The draws of one stored case; none where the case panicked or a value has no score.
+/// The draws of one stored case; none where a value stays nominal, has no score, or the case
+/// panicked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredDraws {
     /// Drawn value per draw key.
@@ -170,6 +170,30 @@ impl Run {
             return Err(self.damage(TableName::Cases, next.to_string(), allowed));
         }
         Ok(series)
+    }
+
+    /// The first failure of every case of a population, by case index.
+    ///
+    /// # Errors
+    /// Damage in the table.
+    pub fn failures(&self, population: usize) -> Result<Vec<Option<Failure>>, Problems> {
+        let cases = self.outline.definition.populations[population].cases;
+        let names = ["case", "status", "failure_message"];
+        let chosen = |name: &str| names.contains(&name);
+        let mut reader = self.reader(TableName::Cases, chosen, population, &(0..cases))?;
+        let statuses: Vec<&str> = schema::statuses().collect();
+        let mut failures = Vec::new();
+        while let Some(batch) = self.next(TableName::Cases, &mut reader)? {
+            self.check_cases(&batch, failures.len() as u64)?;
+            let status = self.words(TableName::Cases, &batch, "status", &statuses)?;
+            let message = batch.column_by_name("failure_message").expect("a column");
+            let message = message.as_string::<i32>();
+            failures.extend(status.iter().zip(message).map(|(status, message)| {
+                let kind = FailureKind::ALL[status.filter(|status| *status > 0)? - 1];
+                Some(Failure::new(kind, message.unwrap_or_default()))
+            }));
+        }
+        Ok(failures)
     }
 
     /// The draws of some cases of a population.
@@ -310,90 +334,6 @@ impl Run {
         Ok(())
     }
 
-    fn mode_rows(&self, batch: &RecordBatch) -> Result<Vec<ModeRow>, Problems> {
-        let definition = &self.outline.definition;
-        let column = |name: &str| batch.column_by_name(name).expect("a column of the registry");
-        let words = |name: &'static str, words: &[&str]| {
-            let array = column(name).as_dictionary::<Int32Type>();
-            let known: Vec<Option<usize>> = array
-                .values()
-                .as_string::<i32>()
-                .iter()
-                .map(|word| words.iter().position(|known| Some(*known) == word))
-                .collect();
-            let index = |row: usize| match array.key(row) {
-                None => Ok(None),
-                Some(key) => known.get(key).copied().flatten().map(Some).ok_or_else(|| {
-                    let found = "a word that the run does not know";
-                    let allowed = format!("one of {} in {name}", words.join(", "));
-                    self.damage(TableName::Modes, found, allowed)
-                }),
-            };
-            (0..batch.num_rows()).map(index).collect::<Result<Vec<_>, _>>()
-        };
-        let populations: Vec<&str> =
-            definition.populations.iter().map(|p| p.name.as_str()).collect();
-        let variants: Vec<&str> = definition.variants.iter().map(|v| v.name.as_str()).collect();
-        let modes: Vec<&str> = definition.modes.iter().map(String::as_str).collect();
-        let population = words("population", &populations)?;
-        let variant = words("variant", &variants)?;
-        let mode = words("mode", &modes)?;
-        let branch = words("branch", &schema::BRANCHES.map(Branch::name))?;
-        let status = words("status", &schema::statuses().collect::<Vec<_>>())?;
-        let case = column("case").as_primitive::<Int64Type>();
-        let time = column("flight_time_s").as_primitive::<Float64Type>();
-        let (label, message) = (column("label"), column("failure_message"));
-        let text = |array: &dyn Array, row: usize| {
-            let array = array.as_string::<i32>();
-            array.is_valid(row).then(|| array.value(row).to_owned())
-        };
-        let number = |name: &str, row: usize| {
-            let array = column(name).as_primitive::<Float64Type>();
-            array.is_valid(row).then(|| array.value(row))
-        };
-        let mut rows = Vec::with_capacity(batch.num_rows());
-        for row in 0..batch.num_rows() {
-            let damage = |found: &str, allowed: &str| self.damage(TableName::Modes, found, allowed);
-            let flight_time = definition
-                .flight_times_s
-                .iter()
-                .position(|t| time.is_valid(row) && t.to_bits() == time.value(row).to_bits());
-            let (Some(population), Some(variant), Some(flight_time), true) =
-                (population[row], variant[row], flight_time, case.is_valid(row))
-            else {
-                return Err(damage("a row of no evaluation", "population, case, variant and time"));
-            };
-            let outcome = match status[row] {
-                Some(0) => {
-                    let (Some(re), Some(im), Some(branch)) =
-                        (number("pole_re_rad_s", row), number("pole_im_rad_s", row), branch[row])
-                    else {
-                        return Err(damage("a row without its pole", "a pole where status is ok"));
-                    };
-                    Ok(Pole {
-                        mode: mode[row],
-                        branch: schema::BRANCHES[branch],
-                        label: text(label, row),
-                        value: Complex::new(re, im),
-                        identity_confidence: number("identity_confidence", row),
-                        participation_structure: number("participation_structure", row),
-                        participation_nozzle: number("participation_nozzle", row),
-                        residual: number("residual", row),
-                    })
-                }
-                Some(failed) => Err(Failure::new(
-                    FailureKind::ALL[failed - 1],
-                    text(message, row).unwrap_or_default(),
-                )),
-                None => return Err(damage("a row without a status", "ok or a failure")),
-            };
-            let case = case.value(row) as u64;
-            let mode = mode[row];
-            rows.push(ModeRow { population, case, variant, flight_time, mode, outcome });
-        }
-        Ok(rows)
-    }
-
     pub(super) fn damage(
         &self,
         table: TableName,
@@ -463,9 +403,9 @@ mod tests {
                     |record| {
                         let (case, modes) = rows(&definition, record);
                         expected[case.population].extend(modes);
-                        let known = |values: &[f64]| -> Vec<Option<f64>> {
-                            let known = |i: usize| values.get(i).copied().filter(|v| v.is_finite());
-                            (0..2).map(known).collect()
+                        // A case that panicked has no draws.
+                        let known = |values: &[Option<f64>]| -> Vec<Option<f64>> {
+                            (0..2).map(|i| values.get(i).copied().flatten()).collect()
                         };
                         let stored = StoredDraws {
                             values: known(&case.values),

@@ -90,6 +90,12 @@ impl TableName {
     }
 }
 
+/// Whether NULL in a row that did not fail says that the quantity does not arise, which is good:
+/// the time to double of a stable pole.
+pub fn null_is_good(column: &str) -> bool {
+    column.starts_with("time_to_double")
+}
+
 /// Words of the `status` columns: `ok`, then the failures.
 pub fn statuses() -> impl Iterator<Item = &'static str> {
     std::iter::once("ok").chain(FailureKind::ALL.map(FailureKind::name))
@@ -126,8 +132,8 @@ pub fn plan(outline: &Outline) -> Vec<Column<CaseRow>> {
     identity(outline).into_iter().chain(draws(outline)).collect()
 }
 
-fn identity(outline: &Outline) -> Vec<Column<CaseRow>> {
-    vec![
+fn identity(outline: &Outline) -> [Column<CaseRow>; 2] {
+    [
         population(outline, |r: &CaseRow| r.population),
         Column::count("case", "Case index inside the population", |r: &CaseRow| {
             Some(r.case as i64)
@@ -137,7 +143,7 @@ fn identity(outline: &Outline) -> Vec<Column<CaseRow>> {
 
 /// Columns of the `cases` table.
 pub fn cases(outline: &Outline) -> Vec<Column<CaseRow>> {
-    let mut columns = identity(outline);
+    let mut columns = Vec::from(identity(outline));
     columns.extend([
         Column::word(
             "status",
@@ -164,16 +170,17 @@ pub fn cases(outline: &Outline) -> Vec<Column<CaseRow>> {
     columns
 }
 
+/// Drawn value and normal score of every draw key.
 fn draws(outline: &Outline) -> Vec<Column<CaseRow>> {
     let mut columns = Vec::new();
     for (index, draw) in outline.draws.iter().enumerate() {
-        let description = format!("{}; key {}", draw.description, draw.key);
+        let description = format!("{}; key {}; NULL if nominal", draw.description, draw.key);
         let value = move |r: &CaseRow| r.values.get(index).copied().flatten();
         columns.push(Column::number(&draw.column, &draw.unit, description, value));
     }
     for (index, draw) in outline.draws.iter().enumerate() {
         let description =
-            format!("Normal score of {}; NULL for a value beyond its law", draw.column);
+            format!("Normal score of {}; NULL if nominal or beyond its law", draw.column);
         let score = move |r: &CaseRow| r.scores.get(index).copied().flatten();
         columns.push(Column::number(draw.score_column(), "sigma", description, score));
     }
@@ -383,13 +390,16 @@ pub fn worst(outline: &Outline) -> Vec<Column<WorstRow>> {
         Column::word("draw", "Draw key, the farthest from nominal first", keys, |r: &WorstRow| {
             r.draw
         }),
-        Column::number("value", "", "Drawn value, in the unit of its column", |r: &WorstRow| {
-            r.value
-        }),
+        Column::number(
+            "value",
+            "",
+            "Drawn value, in the unit of its column; NULL if nominal",
+            |r: &WorstRow| r.value,
+        ),
         Column::number(
             "score_sigma",
             "sigma",
-            "Normal score of the value; NULL for a value beyond its law",
+            "Normal score of the value; NULL if nominal or beyond its law",
             |r: &WorstRow| r.score,
         ),
         Column::number(
@@ -400,7 +410,7 @@ pub fn worst(outline: &Outline) -> Vec<Column<WorstRow>> {
         ),
         Column::flag(
             "outside_law",
-            "Whether the value lies beyond the range of its law",
+            "Whether it is an adverse value that the law cannot give",
             move |r: &WorstRow| outside(r).map(|(draw, value)| draw.outside_law(value)),
         ),
     ]

@@ -30,13 +30,20 @@ pub fn summary(run: &Run, memory: usize) -> Result<Vec<SummaryRow>, Problems> {
         let at_once = (memory / bytes.max(1)).max(1);
         for pairs in pairs.chunks(at_once) {
             for ((time, mode), variants) in at_times(run, population, pairs)? {
-                let group = |variant| Group { population, variant, mode, flight_time: Some(time) };
-                done.insert((Some(time), mode), sum_up(run, group, variants)?);
+                let rows = variants.iter().enumerate().map(|(variant, series)| {
+                    let group = Group { population, variant, mode, flight_time: Some(time) };
+                    sum_up(run, group, series)
+                });
+                done.insert((Some(time), mode), rows.collect::<Result<_, _>>()?);
             }
         }
         for mode in modes {
-            let group = |variant| Group { population, variant, mode, flight_time: None };
-            done.insert((None, mode), sum_up(run, group, reduced(run, population, mode)?)?);
+            // One variant at a time: the gains are stored.
+            let reduced = (0..definition.variants.len()).map(|variant| {
+                let group = Group { population, variant, mode, flight_time: None };
+                sum_up(run, group, &reduced(run, group)?)
+            });
+            done.insert((None, mode), reduced.collect::<Result<_, _>>()?);
         }
         rows.extend(groups(definition, population).iter().map(|group| {
             let variants = &done[&(group.flight_time, group.mode)];
@@ -73,55 +80,37 @@ fn at_times(
     Ok(series)
 }
 
-/// The series of every variant with each case reduced to its worst flight time, from `cases`.
-fn reduced(run: &Run, population: usize, mode: usize) -> Result<Vec<Series>, Problems> {
-    let definition = &run.outline().definition;
-    let metrics = metrics(definition);
-    let mut variants = Vec::new();
-    for variant in 0..definition.variants.len() {
-        let column = |quantity| column(run, &metrics, population, quantity, variant, mode);
-        variants.push(Series {
-            damping_ratio: column(Quantity::DampingRatioMin)?,
-            frequency_hz: column(Quantity::FrequencyOfMin)?,
-            pole_re_rad_s: column(Quantity::PoleRealMax)?,
-            damping_ratio_gain: if variant == 0 {
-                Vec::new()
-            } else {
-                column(Quantity::DampingRatioGainMin)?
-            },
-        });
-    }
-    Ok(variants)
+/// The series of a group with each case reduced to its worst flight time, from `cases`.
+fn reduced(run: &Run, group: Group) -> Result<Series, Problems> {
+    let metrics = metrics(&run.outline().definition);
+    let column = |quantity| column(run, &metrics, group, quantity);
+    Ok(Series {
+        damping_ratio: column(Quantity::DampingRatioMin)?,
+        frequency_hz: column(Quantity::FrequencyOfMin)?,
+        pole_re_rad_s: column(Quantity::PoleRealMax)?,
+        damping_ratio_gain: match group.variant {
+            0 => Vec::new(),
+            _ => column(Quantity::DampingRatioGainMin)?,
+        },
+    })
 }
 
-/// The values of a metric for every case of a population; NaN for NULL.
+/// The values of a metric for every case of a group; NaN for NULL.
 fn column(
     run: &Run,
     metrics: &[Metric],
-    population: usize,
+    group: Group,
     quantity: Quantity,
-    variant: usize,
-    mode: usize,
 ) -> Result<Vec<f64>, Problems> {
-    let metric = metric::find(metrics, quantity, variant, mode).expect("the registry has it");
-    let mut columns = run.numbers(population, &[&metric.name])?;
-    Ok(columns.swap_remove(0))
+    let metric = metric::find(metrics, quantity, group.variant, group.mode);
+    let name = &metric.expect("the registry has it").name;
+    Ok(run.numbers(group.population, &[name])?.swap_remove(0))
 }
 
-fn sum_up(
-    run: &Run,
-    group: impl Fn(usize) -> Group,
-    variants: Vec<Series>,
-) -> Result<Vec<SummaryRow>, Problems> {
-    let mut rows = Vec::new();
-    for (variant, series) in variants.into_iter().enumerate() {
-        let group = group(variant);
-        let drawn = run.outline().definition.populations[group.population].drawn;
-        let row = summarise(group, drawn, &series)
-            .map_err(|error| run.damage(TableName::Modes, error.to_string(), "finite numbers"))?;
-        rows.push(row);
-    }
-    Ok(rows)
+fn sum_up(run: &Run, group: Group, series: &Series) -> Result<SummaryRow, Problems> {
+    let drawn = run.outline().definition.populations[group.population].drawn;
+    summarise(group, drawn, series)
+        .map_err(|error| run.damage(TableName::Modes, error.to_string(), "finite numbers"))
 }
 
 /// The `most` worst cases of every population, variant and named mode, each with all its draws,
@@ -137,7 +126,8 @@ pub fn worst(run: &Run, most: usize) -> Result<Vec<WorstRow>, Problems> {
         let first = rows.len();
         for variant in 0..definition.variants.len() {
             for mode in 0..definition.modes.len() {
-                let column = |quantity| column(run, &metrics, population, quantity, variant, mode);
+                let group = Group { population, variant, mode, flight_time: None };
+                let column = |quantity| column(run, &metrics, group, quantity);
                 let damping = column(Quantity::DampingRatioMin)?;
                 let cases = smallest(&damping, most);
                 let time = column(Quantity::FlightTimeOfMin)?;
@@ -163,7 +153,11 @@ pub fn worst(run: &Run, most: usize) -> Result<Vec<WorstRow>, Problems> {
         for row in cases {
             let stored = &draws[&row.case];
             let mut order: Vec<usize> = (0..run.outline().draws.len()).collect();
-            let distance = |draw: &usize| stored.scores[*draw].map_or(f64::INFINITY, f64::abs);
+            let distance = |draw: &usize| match (stored.values[*draw], stored.scores[*draw]) {
+                (None, _) => 0.0,
+                (Some(_), None) => f64::INFINITY,
+                (Some(_), Some(score)) => score.abs(),
+            };
             order.sort_by(|a, b| distance(b).total_cmp(&distance(a)));
             if order.is_empty() {
                 rows.push(row);

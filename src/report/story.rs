@@ -120,7 +120,10 @@ fn worst_case(outline: &Outline, rows: &[&WorstRow]) -> Option<String> {
         let value = row.value?;
         Some(match row.score {
             Some(score) => format!("{} {score:+.1} σ", draw.key),
-            None => format!("{} {value} {} (outside its law)", draw.key, draw.unit),
+            None if draw.outside_law(value) => {
+                format!("{} {value} {} (outside its law)", draw.key, draw.unit)
+            }
+            None => format!("{} {value} {}", draw.key, draw.unit),
         })
     });
     let draws: Vec<String> = draws.take(DRAWS).collect();

@@ -211,7 +211,15 @@ mod tests {
         let angle = 0.8_f64;
         let mut sets = [
             set(0.0, ONES, &[(1.0, A), (2.0, B), (3.0, C)]),
-            set(1.0, ONES, &[(1.0, between(angle)), (2.0, between(angle + 1.570_796_3)), (3.0, C)]),
+            set(
+                1.0,
+                ONES,
+                &[
+                    (1.0, between(angle)),
+                    (2.0, between(angle + std::f64::consts::FRAC_PI_2)),
+                    (3.0, C),
+                ],
+            ),
         ];
         let parents = label(&mut sets, &Thresholds::default());
         assert_eq!(labels(&sets[1]), ["m004", "m005", "m003"]);

@@ -11,6 +11,7 @@ pub mod free_free;
 pub mod label;
 pub mod orientation;
 pub mod raw;
+mod reading;
 pub mod solve;
 pub mod stick;
 pub mod weigh;

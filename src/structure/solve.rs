@@ -46,6 +46,12 @@ pub enum Error {
         /// Grid that moves in the first of the surplus ones.
         grid: String,
     },
+    /// Nothing is left of the modes.
+    #[error("no elastic mode is selected at the flight time {time_s} s")]
+    NoModes {
+        /// Flight time, s.
+        time_s: f64,
+    },
     /// The eigen-solver gave up, or the matrices are not finite.
     #[error("the eigenvalue solver did not converge: the values are too large or too small")]
     NoConvergence,
@@ -94,7 +100,8 @@ pub fn mode_set(
     ))
 }
 
-/// Labelled modes at all of `times_s`, and the quality of the rigid-body modes at each.
+/// Labelled modes at all of `times_s`, and the quality of the rigid-body modes at each; with
+/// [`Selection::Count`] a model gives any number of modes, for instance to benches.
 ///
 /// # Errors
 /// See [`Error`].
@@ -110,6 +117,9 @@ pub fn solve(
     let (mut sets, mut rigid) = (Vec::new(), Vec::new());
     for &time_s in times_s {
         let (set, quality) = mode_set(stick, time_s, selection)?;
+        if set.modes.is_empty() {
+            return Err(Error::NoModes { time_s });
+        }
         sets.push(set);
         rigid.push(quality);
     }

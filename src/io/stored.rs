@@ -1,0 +1,109 @@
+//! Batches of a stored table decoded to rows again.
+//!
+//! The inverse of `schema`; which batches are read is decided in `run`.
+
+use super::run::Run;
+use super::schema::{self, TableName};
+use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
+use crate::campaign::row::ModeRow;
+use crate::problem::Problems;
+use arrow::array::{Array, AsArray};
+use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
+use arrow::record_batch::RecordBatch;
+use nalgebra::Complex;
+
+impl Run {
+    /// A column of words by their indices.
+    pub(super) fn words(
+        &self,
+        table: TableName,
+        batch: &RecordBatch,
+        name: &str,
+        words: &[&str],
+    ) -> Result<Vec<Option<usize>>, Problems> {
+        let column = batch.column_by_name(name).expect("a column of the registry");
+        let array = column.as_dictionary::<Int32Type>();
+        let known: Vec<Option<usize>> = array
+            .values()
+            .as_string::<i32>()
+            .iter()
+            .map(|word| words.iter().position(|known| Some(*known) == word))
+            .collect();
+        let index = |row: usize| match array.key(row) {
+            None => Ok(None),
+            Some(key) => known.get(key).copied().flatten().map(Some).ok_or_else(|| {
+                let allowed = format!("one of {} in {name}", words.join(", "));
+                self.damage(table, "a word that the run does not know", allowed)
+            }),
+        };
+        (0..batch.num_rows()).map(index).collect()
+    }
+
+    /// The rows of a batch of the `modes` table, every column read.
+    pub(super) fn mode_rows(&self, batch: &RecordBatch) -> Result<Vec<ModeRow>, Problems> {
+        let definition = &self.outline().definition;
+        let column = |name: &str| batch.column_by_name(name).expect("a column of the registry");
+        let words = |name: &str, words: &[&str]| self.words(TableName::Modes, batch, name, words);
+        let populations: Vec<&str> =
+            definition.populations.iter().map(|p| p.name.as_str()).collect();
+        let variants: Vec<&str> = definition.variants.iter().map(|v| v.name.as_str()).collect();
+        let modes: Vec<&str> = definition.modes.iter().map(String::as_str).collect();
+        let population = words("population", &populations)?;
+        let variant = words("variant", &variants)?;
+        let mode = words("mode", &modes)?;
+        let branch = words("branch", &schema::BRANCHES.map(Branch::name))?;
+        let status = words("status", &schema::statuses().collect::<Vec<_>>())?;
+        let case = column("case").as_primitive::<Int64Type>();
+        let time = column("flight_time_s").as_primitive::<Float64Type>();
+        let (label, message) = (column("label"), column("failure_message"));
+        let text = |array: &dyn Array, row: usize| {
+            let array = array.as_string::<i32>();
+            array.is_valid(row).then(|| array.value(row).to_owned())
+        };
+        let number = |name: &str, row: usize| {
+            let array = column(name).as_primitive::<Float64Type>();
+            array.is_valid(row).then(|| array.value(row))
+        };
+        let mut rows = Vec::with_capacity(batch.num_rows());
+        for row in 0..batch.num_rows() {
+            let damage = |found: &str, allowed: &str| self.damage(TableName::Modes, found, allowed);
+            let flight_time = definition
+                .flight_times_s
+                .iter()
+                .position(|t| time.is_valid(row) && t.to_bits() == time.value(row).to_bits());
+            let (Some(population), Some(variant), Some(flight_time), true) =
+                (population[row], variant[row], flight_time, case.is_valid(row))
+            else {
+                return Err(damage("a row of no evaluation", "population, case, variant and time"));
+            };
+            let outcome = match status[row] {
+                Some(0) => {
+                    let (Some(re), Some(im), Some(branch)) =
+                        (number("pole_re_rad_s", row), number("pole_im_rad_s", row), branch[row])
+                    else {
+                        return Err(damage("a row without its pole", "a pole where status is ok"));
+                    };
+                    Ok(Pole {
+                        mode: mode[row],
+                        branch: schema::BRANCHES[branch],
+                        label: text(label, row),
+                        value: Complex::new(re, im),
+                        identity_confidence: number("identity_confidence", row),
+                        participation_structure: number("participation_structure", row),
+                        participation_nozzle: number("participation_nozzle", row),
+                        residual: number("residual", row),
+                    })
+                }
+                Some(failed) => Err(Failure::new(
+                    FailureKind::ALL[failed - 1],
+                    text(message, row).unwrap_or_default(),
+                )),
+                None => return Err(damage("a row without a status", "ok or a failure")),
+            };
+            let case = case.value(row) as u64;
+            let mode = mode[row];
+            rows.push(ModeRow { population, case, variant, flight_time, mode, outcome });
+        }
+        Ok(rows)
+    }
+}
