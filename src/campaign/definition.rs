@@ -72,15 +72,4 @@ impl Definition {
             population.cases = cases;
         }
     }
-
-    /// Fixes the draws of the corner at index `population` and of the Monte Carlo around it, which
-    /// follows if there is one.
-    pub fn fix_corner(&mut self, population: usize, fixed: &[(usize, f64)]) {
-        let around = format!("{}_dispersed", self.populations[population].name);
-        for (index, member) in self.populations.iter_mut().enumerate() {
-            if index == population || member.name == around {
-                member.fixed = fixed.to_vec();
-            }
-        }
-    }
 }

@@ -127,8 +127,7 @@ impl Slots {
             // that an undispersed mode keeps its nominal value bit for bit.
             let nominal_hz = mode.nominal_rad_s / TAU;
             let drawn_hz = value(mode.frequency, nominal_hz)?;
-            let omega =
-                if drawn_hz == nominal_hz { mode.nominal_rad_s } else { TAU * drawn_hz };
+            let omega = if drawn_hz == nominal_hz { mode.nominal_rad_s } else { TAU * drawn_hz };
             body.frequency_rad_s.push(omega);
             body.damping_ratio.push(value(mode.damping, structural_damping)?);
         }

@@ -176,9 +176,9 @@ impl<'a> Evaluator<'a> {
                 let size = plant.layout.coordinates();
                 let mut model = Model::zeros(size);
                 let solver = solver(solvers, size);
-                let outcome = drawn.clone().and_then(|()| {
-                    self.solve(at, variant, vehicle, &mut model, solver, poles)
-                });
+                let outcome = drawn
+                    .clone()
+                    .and_then(|()| self.solve(at, variant, vehicle, &mut model, solver, poles));
                 let evaluation = Evaluation { variant, flight_time, outcome };
                 look(&View { plant, model: &model, evaluation: &evaluation });
                 evaluations.push(evaluation);
@@ -226,7 +226,8 @@ impl<'a> Evaluator<'a> {
                 &mut scratch,
             )
             .map_err(|lost| self.lost(mode, lost))?;
-            let branches = [(Branch::Primary, Some(identity.primary)), (Branch::Partner, identity.partner)];
+            let branches =
+                [(Branch::Primary, Some(identity.primary)), (Branch::Partner, identity.partner)];
             for (branch, found) in branches {
                 let Some(found) = found else { continue };
                 rows.push(named_pole(plant, mode, branch, &at.labels[mode], &found)?);
@@ -270,7 +271,8 @@ fn named_pole(
     let (pair, layout) = (&found.reference.pair, &plant.layout);
     let bound = RESIDUAL_FACTOR * layout.coordinates() as f64 * f64::EPSILON;
     if !(pair.residual <= bound) {
-        let message = format!("residual of pole {} is {:.2e}, allowed {bound:.2e}", pair.pole, pair.residual);
+        let message =
+            format!("residual of pole {} is {:.2e}, allowed {bound:.2e}", pair.pole, pair.residual);
         return Err(Failure::new(FailureKind::Residual, message));
     }
     Ok(Pole {

@@ -1,6 +1,6 @@
 //! The registry of scalar metrics: each reduces a case to one number per variant and named mode.
 //!
-//! A metric is one line of [`QUANTITIES`]; its column, unit and description derive from it. How
+//! A metric is one line of `QUANTITIES`; its column, unit and description derive from it. How
 //! cases are summed up is decided in `summary`.
 
 use super::definition::Definition;

@@ -102,17 +102,13 @@ fn case(
     let Some(&head) = at.first() else {
         return Ok(Vec::new());
     };
-    let pick = |of: fn(&crate::vehicle::Mode) -> &Vec<Vector3<f64>>, station: usize| {
-        set.modes.iter().map(|mode| of(mode)[station]).collect::<Vec<Vector3<f64>>>()
-    };
-    let values: Vec<(f64, Vec<Vector3<f64>>, Vec<Vector3<f64>>)> = at
+    let stations: Vec<Station> = at
         .iter()
-        .map(|&station| {
-            let x = set.grids[station].position_m.x - set.grids[head].position_m.x;
-            (x, pick(|mode| &mode.shape, station), pick(|mode| &mode.slope, station))
+        .map(|&station| Station {
+            x_m: set.grids[station].position_m.x - set.grids[head].position_m.x,
+            shape: set.modes.iter().map(|mode| mode.shape[station]).collect(),
+            slope: set.modes.iter().map(|mode| mode.slope[station]).collect(),
         })
         .collect();
-    let stations: Vec<Station<'_>> =
-        values.iter().map(|(x_m, shape, slope)| Station { x_m: *x_m, shape, slope }).collect();
     Ok(case_per_flow(&stations))
 }

@@ -7,6 +7,7 @@ pub mod actuator;
 pub mod check;
 pub mod completions;
 pub mod error;
+pub mod gate;
 pub mod how_many;
 pub mod init;
 pub mod modes;
@@ -22,7 +23,7 @@ pub mod summary;
 pub use error::Error;
 
 use clap::{Parser, Subcommand};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
 /// Exit code: everything asked for holds.
@@ -53,6 +54,7 @@ enum Command {
     Nominal(nominal::Args),
     Run(run::Args),
     Summary(summary::Args),
+    Gate(gate::Args),
     Replay(replay::Args),
     HowMany(how_many::Args),
     Planar(planar::Args),
@@ -73,6 +75,7 @@ pub fn run() -> ExitCode {
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),
+        Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),
@@ -80,11 +83,14 @@ pub fn run() -> ExitCode {
         Command::Schema(args) => schema::run(args, &mut out),
         Command::Completions(args) => completions::run(args, &mut out),
     };
-    let code = result.unwrap_or_else(|error: Error| {
-        eprintln!("{error}");
-        error.code()
-    });
-    // A closed pipe is no error of ours.
-    let _ = out.flush();
+    let code = match result.and_then(|code| Ok(out.flush().map(|()| code)?)) {
+        Ok(code) => code,
+        // A reader that closed the pipe has what it wants.
+        Err(Error::Output(error)) if error.kind() == ErrorKind::BrokenPipe => PASS,
+        Err(error) => {
+            eprintln!("{error}");
+            error.code()
+        }
+    };
     ExitCode::from(code)
 }

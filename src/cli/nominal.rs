@@ -27,8 +27,7 @@ pub struct Args {
 /// All problems of the run and what it names.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let loaded = io::scenario::load(&args.run)?;
-    let nominal =
-        Population { name: "nominal".into(), cases: 1, fixed: Vec::new(), drawn: false };
+    let nominal = Population { name: "nominal".into(), cases: 1, fixed: Vec::new(), drawn: false };
     let definition = Definition { populations: vec![nominal], ..loaded.definition };
     let sampler = Sampler::new(&loaded.dispersion, definition.seed);
     let vehicle = &loaded.vehicle.vehicle;

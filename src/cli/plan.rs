@@ -31,12 +31,10 @@ pub struct Args {
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let loaded = io::scenario::load(&args.run)?;
     let mut definition = loaded.definition;
-    let open = loaded.corners.iter().flat_map(|c| [c.population, c.population + 1]);
-    let left_out: Vec<String> = open
-        .filter_map(|index| definition.populations.get(index))
-        .map(|p| p.name.clone())
-        .collect();
-    definition.populations.retain(|p| !left_out.contains(&p.name));
+    let corners = loaded.corners.iter().flat_map(|c| c.populations(&definition.populations));
+    let open: Vec<usize> = corners.collect();
+    let mut index = 0..;
+    definition.populations.retain(|_| index.next().is_none_or(|index| !open.contains(&index)));
     let sampler = Sampler::new(&loaded.dispersion, definition.seed);
     let draws = loaded.dispersion.draws();
     write!(out, "{}", report::plan::table(&definition, draws, &sampler))?;

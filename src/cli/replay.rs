@@ -95,12 +95,17 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         Ok(())
     })?;
     let draws = stored.draws(population, [args.case])?;
-    let same_draws = draws
-        .get(&args.case)
-        .is_some_and(|stored| same(&stored.values, &case.values) && same(&stored.scores, &case.scores));
+    let same_draws = draws.get(&args.case).is_some_and(|stored| {
+        same(&stored.values, &case.values) && same(&stored.scores, &case.scores)
+    });
     let differing = rows.iter().zip(&modes).filter(|(a, b)| a != b).count();
     if same_draws && rows.len() == modes.len() && differing == 0 {
-        writeln!(out, "{} draws and {} rows are bit for bit as stored", case.values.len(), rows.len())?;
+        writeln!(
+            out,
+            "{} draws and {} rows are bit for bit as stored",
+            case.values.len(),
+            rows.len()
+        )?;
         return Ok(PASS);
     }
     let draws = if same_draws { "as stored" } else { "different from the stored ones" };

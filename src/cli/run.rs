@@ -1,6 +1,6 @@
 //! `tvse run`: the campaign.
 
-use super::{Error, PASS, progress};
+use super::{Error, PASS, gate, progress};
 use crate::campaign::evaluator::Evaluator;
 use crate::campaign::{Outline, Pool, StoredPoles, corner, outline::DrawColumn, pool};
 use crate::dispersion::Sampler;
@@ -31,12 +31,15 @@ pub struct Args {
     /// Threads (default: all processors); results do not depend on it
     #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
-    /// Cases of the dispersed population, instead of the run definition's
+    /// Cases of every drawn population, instead of the run definition's
     #[arg(long, value_name = "N")]
     cases: Option<u64>,
     /// Seed, instead of the run definition's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Gates to hold the results against; the exit code is theirs (see `tvse gate`)
+    #[arg(long, value_name = "FILE")]
+    gates: Option<PathBuf>,
     /// Poles stored in the `modes` table
     #[arg(long, value_enum, default_value_t = Poles::Named)]
     poles: Poles,
@@ -59,13 +62,12 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let mut loaded = io::scenario::load(&args.run)?;
     let folder = args.output.clone().unwrap_or_else(|| args.run.with_extension(""));
     if folder.exists() {
-        return Err(Problems::input(
-            folder.display().to_string(),
-            "",
-            "something that exists",
-            "the name of a new folder (see --output)",
-        )
-        .into());
+        let allowed = "the name of a new folder (see --output)";
+        let folder = folder.display().to_string();
+        return Err(Problems::input(folder, "", "something that exists", allowed).into());
+    }
+    if let Some(gates) = &args.gates {
+        crate::gate::parse(&io::files::read_text(gates)?, &io::files::name(gates))?;
     }
     let definition = &mut loaded.definition;
     if let Some(cases) = args.cases {
@@ -113,7 +115,10 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     for (table, content) in finished.run.contents() {
         writeln!(out, "{}: {} rows", finished.run.path(table).display(), content.rows)?;
     }
-    Ok(PASS)
+    match &args.gates {
+        Some(gates) => gate::judge(&finished.run, gates, &folder.join("gates.json"), out),
+        None => Ok(PASS),
+    }
 }
 
 /// Chooses the sides of corners whose signs are to be evaluated.
@@ -132,7 +137,10 @@ fn fix_corners(
             pool,
         )
         .map_err(|error| unprepared(run_file, &error))?;
-        loaded.definition.fix_corner(corner.population, &fixed);
+        let open: Vec<usize> = corner.populations(&loaded.definition.populations).collect();
+        for population in open {
+            loaded.definition.populations[population].fixed.clone_from(&fixed);
+        }
     }
     Ok(())
 }

@@ -144,8 +144,10 @@ impl Motion {
             gimbal[mode] = attachment.shape[mode] * engine.shape_gain[mode];
             rotation[mode] = attachment.slope[mode] * engine.slope_gain[mode];
         }
-        for local in columns.elastic..count {
-            rotation[local] = attachment.axes.column(local - columns.elastic).into_owned();
+        for (rotation, axis) in
+            rotation[columns.elastic..].iter_mut().zip(attachment.axes.column_iter())
+        {
+            *rotation = axis.into_owned();
         }
         Self { gimbal, rotation }
     }

@@ -7,13 +7,13 @@ use nalgebra::Vector3;
 
 /// One station of the case centreline.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Station<'a> {
+pub struct Station {
     /// Distance from the head end along the flow, m.
     pub x_m: f64,
     /// Translation of every mode at the station, kg^-1/2.
-    pub shape: &'a [Vector3<f64>],
+    pub shape: Vec<Vector3<f64>>,
     /// Rotation of every mode at the station, rad/m per kg^1/2.
-    pub slope: &'a [Vector3<f64>],
+    pub slope: Vec<Vector3<f64>>,
 }
 
 /// Case jet damping (14) per unit mass flow: the k×k matrix C, row-major, 1/kg, of
@@ -21,7 +21,7 @@ pub struct Station<'a> {
 /// ṁ at the last.
 ///
 /// Stations must be at least two, with increasing x from 0 (checked by the scenario).
-pub fn case_per_flow(stations: &[Station<'_>]) -> Vec<f64> {
+pub fn case_per_flow(stations: &[Station]) -> Vec<f64> {
     let modes = stations[0].shape.len();
     let length = stations[stations.len() - 1].x_m - stations[0].x_m;
     let mut matrix = vec![0.0; modes * modes];
@@ -30,8 +30,8 @@ pub fn case_per_flow(stations: &[Station<'_>]) -> Vec<f64> {
         let before = if j == 0 { 0.0 } else { station.x_m - stations[j - 1].x_m };
         let after = stations.get(j + 1).map_or(0.0, |next| next.x_m - station.x_m);
         let weight = (before + after) * (station.x_m - stations[0].x_m) / length;
-        for (row, shape) in matrix.chunks_exact_mut(modes).zip(station.shape) {
-            for (entry, slope) in row.iter_mut().zip(station.slope) {
+        for (row, shape) in matrix.chunks_exact_mut(modes).zip(&station.shape) {
+            for (entry, slope) in row.iter_mut().zip(&station.slope) {
                 // Φᵀ (x̂ × Ψ), with x̂ × ψ = (0, −ψ_z, ψ_y).
                 *entry += weight * (shape.z * slope.y - shape.y * slope.z);
             }
@@ -55,19 +55,17 @@ mod tests {
 
     /// The damping matrix entries −C of the beam bending in y with `count` uniform stations.
     fn beam(count: usize) -> Vec<f64> {
-        let values: Vec<(f64, Vec<Vector3<f64>>, Vec<Vector3<f64>>)> = (0..count)
+        let stations: Vec<Station> = (0..count)
             .map(|j| {
-                let x = j as f64 / (count - 1) as f64;
-                let at: Vec<(f64, f64)> = (0..3).map(|mode| free_free(mode, x)).collect();
-                (
-                    x,
-                    at.iter().map(|v| Vector3::new(0.0, v.0, 0.0)).collect(),
-                    at.iter().map(|v| Vector3::new(0.0, 0.0, v.1)).collect(),
-                )
+                let x_m = j as f64 / (count - 1) as f64;
+                let at: Vec<(f64, f64)> = (0..3).map(|mode| free_free(mode, x_m)).collect();
+                Station {
+                    x_m,
+                    shape: at.iter().map(|v| Vector3::new(0.0, v.0, 0.0)).collect(),
+                    slope: at.iter().map(|v| Vector3::new(0.0, 0.0, v.1)).collect(),
+                }
             })
             .collect();
-        let stations: Vec<Station<'_>> =
-            values.iter().map(|(x, shape, slope)| Station { x_m: *x, shape, slope }).collect();
         case_per_flow(&stations).into_iter().map(|v| -v).collect()
     }
 
@@ -91,43 +89,32 @@ mod tests {
         }
     }
 
+    fn station(x_m: f64, shape: Vector3<f64>, slope: Vector3<f64>) -> Station {
+        Station { x_m, shape: vec![shape], slope: vec![slope] }
+    }
+
     #[test]
     fn bending_in_z_is_damped_like_bending_in_y() {
-        let shape = [Vector3::new(0.0, 0.0, 0.0), Vector3::new(0.0, 0.0, 1.5)];
+        let (phi, psi) = ([0.0, 1.5], 1.5);
         // A rotation −φ' about y moves points aft of it along +z.
-        let slope = [Vector3::new(0.0, -1.5, 0.0), Vector3::new(0.0, -1.5, 0.0)];
-        let z: Vec<Station<'_>> = (0..2)
-            .map(|j| Station { x_m: j as f64, shape: &shape[j..=j], slope: &slope[j..=j] })
-            .collect();
-        let in_y: Vec<Vector3<f64>> = shape.iter().map(|v| Vector3::new(0.0, v.z, 0.0)).collect();
-        let about_z: Vec<Vector3<f64>> =
-            slope.iter().map(|v| Vector3::new(0.0, 0.0, -v.y)).collect();
-        let y: Vec<Station<'_>> = (0..2)
-            .map(|j| Station { x_m: j as f64, shape: &in_y[j..=j], slope: &about_z[j..=j] })
-            .collect();
-        assert_eq!(case_per_flow(&z), case_per_flow(&y));
+        let in_z = [0, 1].map(|j| station(j as f64, Vector3::z() * phi[j], Vector3::y() * -psi));
+        let in_y = [0, 1].map(|j| station(j as f64, Vector3::y() * phi[j], Vector3::z() * psi));
+        assert_eq!(case_per_flow(&in_z), case_per_flow(&in_y));
     }
 
     #[test]
     fn rigid_rotation_about_the_centre_gives_a_sixth() {
-        let count = 2001;
-        let data: Vec<(f64, [Vector3<f64>; 1], [Vector3<f64>; 1])> = (0..count)
-            .map(|j| {
-                let x = j as f64 / f64::from(count - 1);
-                (x, [Vector3::new(0.0, x - 0.5, 0.0)], [Vector3::z()])
-            })
+        let stations: Vec<Station> = (0..2001)
+            .map(|j| f64::from(j) / 2000.0)
+            .map(|x| station(x, Vector3::y() * (x - 0.5), Vector3::z()))
             .collect();
-        let stations: Vec<Station<'_>> =
-            data.iter().map(|(x, shape, slope)| Station { x_m: *x, shape, slope }).collect();
         assert!((-case_per_flow(&stations)[0] - 1.0 / 6.0).abs() < 1e-6);
     }
 
     #[test]
     fn torsion_and_axial_motion_are_not_damped() {
-        let shape = [[Vector3::x()], [Vector3::x() * 2.0]];
-        let slope = [[Vector3::x()], [Vector3::x() * 3.0]];
-        let stations: Vec<Station<'_>> =
-            (0..2).map(|j| Station { x_m: j as f64, shape: &shape[j], slope: &slope[j] }).collect();
+        let stations =
+            [1.0, 2.0].map(|v| station(v - 1.0, Vector3::x() * v, Vector3::x() * (v + 1.0)));
         assert_eq!(case_per_flow(&stations), vec![0.0]);
     }
 }

@@ -19,7 +19,8 @@ pub const FOLDER: &str = "inputs";
 pub fn of(loaded: &Loaded) -> Result<(Vec<PathBuf>, Vec<Input>), Problems> {
     let texts = loaded.texts.iter().map(|(name, _)| PathBuf::from(name));
     let package = package::files(&loaded.modal_package);
-    let paths = texts.chain(package).map(|path| files::absolute(&path)).collect::<Result<Vec<_>, _>>()?;
+    let paths =
+        texts.chain(package).map(|path| files::absolute(&path)).collect::<Result<Vec<_>, _>>()?;
     let input = |path: &PathBuf| {
         // The name is the same wherever the inputs lie.
         let name = relative(&paths, path).join("/");

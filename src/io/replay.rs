@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 
 const TIME: Column = Column("flight_time_s", Holds::Number("s"), "Flight time");
 const VARIANT: Column = Column("variant", Holds::Text, "Way of evaluating the draws");
-const POLE: Column = Column("pole", Holds::Number("1"), "Number of the pole in its evaluation, from 0");
+const POLE: Column =
+    Column("pole", Holds::Number("1"), "Number of the pole in its evaluation, from 0");
 
 /// Nonzero entries of the matrices.
 const MATRICES: Layout = Layout {
@@ -56,7 +57,11 @@ const VECTORS: Layout = Layout {
         POLE,
         Column("right_re", Holds::Number("1"), "Right eigenvector v, A v = s v: real part"),
         Column("right_im", Holds::Number("1"), "Right eigenvector: imaginary part"),
-        Column("left_re", Holds::Number("1"), "Left eigenvector w, w^H A = s w^H, w^H v = 1: real part"),
+        Column(
+            "left_re",
+            Holds::Number("1"),
+            "Left eigenvector w, w^H A = s w^H, w^H v = 1: real part",
+        ),
         Column("left_im", Holds::Number("1"), "Left eigenvector: imaginary part"),
     ],
 };
@@ -118,10 +123,7 @@ impl Replay {
         for (number, &pole) in poles.iter().enumerate() {
             let reference = Reference::new(model, solver.pair(model, pole));
             let number = number as f64;
-            self.poles.push(
-                &[variant],
-                &[time, number, pole.re, pole.im, reference.pair.residual],
-            );
+            self.poles.push(&[variant], &[time, number, pole.re, pole.im, reference.pair.residual]);
             let (right, left) = reference.state_vectors();
             for ((name, v), w) in names.iter().zip(right).zip(left) {
                 self.vectors.push(&[variant, name], &[time, number, v.re, v.im, w.re, w.im]);
@@ -140,9 +142,9 @@ impl Replay {
         let mut files = Vec::new();
         for (layout, table) in tables {
             let name = format!("{}.parquet", layout.name);
-            let bytes = table.to_bytes(layout).map_err(|error| {
-                super::table::problem(&target.join(&name), &error)
-            })?;
+            let bytes = table
+                .to_bytes(layout)
+                .map_err(|error| super::table::problem(&target.join(&name), &error))?;
             files.push((PathBuf::from(name), bytes));
         }
         folder::write(target, &files, Some("matrices.parquet"))?;

@@ -175,7 +175,7 @@ fn candidates(
 /// Follows `reference` from one model to another along a path of models.
 ///
 /// `path(t)` fills a model for t in (0, 1]; a step is accepted when one pole keeps at least
-/// [`STEP_OVERLAP`], else it is halved, down to [`LEAST_STEP`], where the best is taken: a mode
+/// `STEP_OVERLAP`, else it is halved, down to `LEAST_STEP`, where the best is taken: a mode
 /// crosses others by its vectors, not by its frequency.
 ///
 /// # Errors

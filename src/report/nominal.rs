@@ -7,8 +7,18 @@ use comfy_table::{CellAlignment, Table, presets};
 pub fn table(definition: &Definition, record: &Record) -> String {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN).set_header([
-        "time, s", "variant", "mode", "branch", "label", "Re s, rad/s", "Im s, rad/s", "f, Hz",
-        "ζ, %", "double, s", "structure", "nozzle",
+        "time, s",
+        "variant",
+        "mode",
+        "branch",
+        "label",
+        "Re s, rad/s",
+        "Im s, rad/s",
+        "f, Hz",
+        "ζ, %",
+        "double, s",
+        "structure",
+        "nozzle",
     ]);
     let none = String::new;
     for evaluation in &record.evaluations {

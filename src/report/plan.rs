@@ -9,7 +9,8 @@ use comfy_table::{CellAlignment, Table, presets};
 /// Per draw key: unit, law range, and mean, standard deviation, smallest and largest value over
 /// the cases of the `dispersed` population.
 pub fn table(definition: &Definition, draws: &[Draw], sampler: &Sampler<'_>) -> String {
-    let cases = definition.populations.iter().find(|p| p.name == "dispersed").map_or(0, |p| p.cases);
+    let cases =
+        definition.populations.iter().find(|p| p.name == "dispersed").map_or(0, |p| p.cases);
     let mut values = vec![Vec::new(); draws.len()];
     let mut cursor = sampler.cursor();
     for case in 0..cases {
@@ -19,9 +20,9 @@ pub fn table(definition: &Definition, draws: &[Draw], sampler: &Sampler<'_>) -> 
         }
     }
     let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN).set_header([
-        "draw key", "unit", "law", "mean", "sd", "smallest", "largest",
-    ]);
+    table
+        .load_style(presets::ASCII_MARKDOWN)
+        .set_header(["draw key", "unit", "law", "mean", "sd", "smallest", "largest"]);
     for (draw, values) in draws.iter().zip(&values) {
         let law = draw.law.range().map_or("unbounded".to_owned(), |[low, high]| {
             format!("{} to {}", significant(low), significant(high))
@@ -41,5 +42,9 @@ pub fn table(definition: &Definition, draws: &[Draw], sampler: &Sampler<'_>) -> 
     for column in table.column_iter_mut().skip(3) {
         column.set_cell_alignment(CellAlignment::Right);
     }
-    format!("{cases} dispersed cases, seed {}, {} draw keys\n{table}\n", definition.seed, draws.len())
+    format!(
+        "{cases} dispersed cases, seed {}, {} draw keys\n{table}\n",
+        definition.seed,
+        draws.len()
+    )
 }
