@@ -75,6 +75,8 @@ pub struct AtTime {
     plants: Vec<Plant>,
     /// From draws to the drawn vehicle.
     slots: Slots,
+    /// The nominal vehicle.
+    nominal: DrawnVehicle,
     /// Label of every mode of interest.
     pub labels: Vec<String>,
     /// Variants, in the order of the definition.
@@ -187,6 +189,13 @@ impl<'a> Evaluator<'a> {
         let (values, scores) = (draws.values.clone(), draws.scores.clone());
         self.workspaces.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
         Record { population, case, values, scores, evaluations }
+    }
+
+    /// Builds the model of the nominal vehicle at a flight time and in a variant (indices of the
+    /// definition) into `model`, which has the size of its plant.
+    pub fn assemble(&self, flight_time: usize, variant: usize, model: &mut Model) {
+        let at = &self.times[flight_time];
+        at.plant(variant).assemble(&at.nominal, &at.variants[variant].effects, model);
     }
 
     fn take(&self) -> Workspace<'a> {
@@ -345,7 +354,7 @@ fn at_time(
             })
         })
         .collect::<Result<Vec<_>, _>>()?;
-    Ok(AtTime { flight_time_s: time_s, plants, slots, labels, variants })
+    Ok(AtTime { flight_time_s: time_s, plants, slots, nominal, labels, variants })
 }
 
 /// Prepares one variant: nominal model and nominal poles; an error names the mode by index.
