@@ -21,8 +21,13 @@ pub fn story(outline: &Outline, summary: &[SummaryRow], worst: &[WorstRow]) -> S
             continue;
         }
         for (mode, name) in definition.modes.iter().enumerate() {
+            // Around a corner the worst over the flight times says what it is there to say.
+            let corner = !p.fixed.is_empty();
             let rows = || {
-                let of = move |group: &Group| group.population == population && group.mode == mode;
+                let of = move |group: &Group| {
+                    (group.population, group.mode) == (population, mode)
+                        && (!corner || group.flight_time.is_none())
+                };
                 summary.iter().filter(move |row| of(&row.group))
             };
             let failures = rows().filter(|row| row.group.flight_time.is_none());
@@ -114,8 +119,11 @@ fn worst_case(outline: &Outline, rows: &[&WorstRow]) -> Option<String> {
     if let Some(time) = case.time_to_double_s {
         write!(sentence, ", time to double {time:.1} s").expect("a string takes any text");
     }
-    let drawn = outline.definition.populations[case.population].drawn;
-    let draws = rows.iter().filter(|_| drawn).filter_map(|row| {
+    let population = &outline.definition.populations[case.population];
+    let draws = rows.iter().filter(|_| population.drawn).filter_map(|row| {
+        if population.fixed.iter().any(|(fixed, _)| Some(*fixed) == row.draw) {
+            return None;
+        }
         let draw = &outline.draws[row.draw?];
         let value = row.value?;
         Some(match row.score {
