@@ -22,3 +22,6 @@ pub mod spelling;
 pub mod stats;
 pub mod structure;
 pub mod vehicle;
+
+#[cfg(test)]
+mod layers;
