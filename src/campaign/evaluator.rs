@@ -92,27 +92,37 @@ impl AtTime {
 
 /// Buffers of one worker.
 struct Workspace<'a> {
-    solvers: Vec<(usize, Solver)>,
+    buffers: Vec<Buffers>,
     cursor: Cursor<'a>,
     vehicle: DrawnVehicle,
     poles: Vec<Complex<f64>>,
 }
 
-/// The solver for models of `size` coordinates, made when first needed.
-fn solver(solvers: &mut Vec<(usize, Solver)>, size: usize) -> &mut Solver {
-    let known = solvers.iter().position(|(of, _)| *of == size);
-    let index = known.unwrap_or_else(|| {
-        solvers.push((size, Solver::new(size)));
-        solvers.len() - 1
-    });
-    &mut solvers[index].1
+/// Buffers for models of one size.
+struct Buffers {
+    model: Model,
+    scratch: Model,
+    solver: Solver,
+}
+
+impl Buffers {
+    /// The buffers for models of `size` coordinates, made when first needed.
+    fn of(all: &mut Vec<Self>, size: usize) -> &mut Self {
+        let known = all.iter().position(|buffers| buffers.model.coordinates() == size);
+        let index = known.unwrap_or_else(|| {
+            let (model, scratch) = (Model::zeros(size), Model::zeros(size));
+            all.push(Self { model, scratch, solver: Solver::new(size) });
+            all.len() - 1
+        });
+        &mut all[index]
+    }
 }
 
 /// One evaluation as it is made: the model and what was found in it.
 pub struct View<'a> {
     /// Plant of the evaluation.
     pub plant: &'a Plant,
-    /// Model of the evaluation; zero where the draw failed.
+    /// Model of the evaluation; meaningless where the draw failed.
     pub model: &'a Model,
     /// What was found.
     pub evaluation: &'a Evaluation,
@@ -166,7 +176,7 @@ impl<'a> Evaluator<'a> {
     /// Like [`Evaluator::evaluate`], showing every evaluation with its model to `look`.
     pub fn visit(&self, population: usize, case: u64, mut look: impl FnMut(&View<'_>)) -> Record {
         let mut workspace = self.take();
-        let Workspace { solvers, cursor, vehicle, poles } = &mut workspace;
+        let Workspace { buffers, cursor, vehicle, poles } = &mut workspace;
         let rule = &self.definition.populations[population];
         let draws = cursor.draw(case, &rule.fixed, rule.drawn);
         let mut evaluations = Vec::new();
@@ -175,14 +185,11 @@ impl<'a> Evaluator<'a> {
             let drawn = at.slots.draw(self.vehicle, parameters, &draws.effects, vehicle);
             for variant in 0..at.variants.len() {
                 let plant = at.plant(variant);
-                let size = plant.layout.coordinates();
-                let mut model = Model::zeros(size);
-                let solver = solver(solvers, size);
-                let outcome = drawn
-                    .clone()
-                    .and_then(|()| self.solve(at, variant, vehicle, &mut model, solver, poles));
+                let buffers = Buffers::of(buffers, plant.layout.coordinates());
+                let outcome =
+                    drawn.clone().and_then(|()| self.solve(at, variant, vehicle, buffers, poles));
                 let evaluation = Evaluation { variant, flight_time, outcome };
-                look(&View { plant, model: &model, evaluation: &evaluation });
+                look(&View { plant, model: &buffers.model, evaluation: &evaluation });
                 evaluations.push(evaluation);
             }
         }
@@ -201,28 +208,27 @@ impl<'a> Evaluator<'a> {
     fn take(&self) -> Workspace<'a> {
         let idle = self.workspaces.lock().unwrap_or_else(PoisonError::into_inner).pop();
         idle.unwrap_or_else(|| Workspace {
-            solvers: Vec::new(),
+            buffers: Vec::new(),
             cursor: self.sampler.cursor(),
             vehicle: DrawnVehicle::default(),
             poles: Vec::new(),
         })
     }
 
-    /// Solves one variant of the drawn `vehicle`; fills `model`.
+    /// Solves one variant of the drawn `vehicle`; its model stays in `buffers`.
     fn solve(
         &self,
         at: &AtTime,
         variant: usize,
         vehicle: &DrawnVehicle,
-        model: &mut Model,
-        solver: &mut Solver,
+        buffers: &mut Buffers,
         poles: &mut Vec<Complex<f64>>,
     ) -> Result<Vec<Pole>, Failure> {
+        let Buffers { model, scratch, solver } = buffers;
         let prepared = &at.variants[variant];
         let plant = at.plant(variant);
         plant.assemble(vehicle, &prepared.effects, model);
         solver.poles(model, poles).map_err(|error| Failure::from(&error))?;
-        let mut scratch = Model::zeros(model.coordinates());
         let mut rows = Vec::new();
         for (mode, reference) in prepared.references.iter().enumerate() {
             let identity = identify::identify(
@@ -232,7 +238,7 @@ impl<'a> Evaluator<'a> {
                 model,
                 poles,
                 self.definition.exchange_ratio,
-                &mut scratch,
+                scratch,
             )
             .map_err(|lost| self.lost(mode, lost))?;
             let branches =

@@ -1,10 +1,12 @@
 //! `tvse schema`: the JSON Schema of a TOML file.
 
 use super::{Error, PASS};
+use crate::gate;
+use crate::io::package;
 use crate::scenario::schema::{FileKind, schema};
 use std::io::Write;
 
-/// The JSON Schema of a kind of TOML file, for editors and for reading.
+/// The JSON Schema of a kind of file, for editors and for reading.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Example:
@@ -28,6 +30,10 @@ enum File {
     Stick,
     /// Gates
     Gates,
+    /// The head of a modal package, package.toml
+    Package,
+    /// The outcomes of gates, gates.json
+    Report,
 }
 
 /// Runs the command.
@@ -35,13 +41,15 @@ enum File {
 /// # Errors
 /// Output that cannot be written.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
-    let schema = schema(match args.file {
-        File::Vehicle => FileKind::Vehicle,
-        File::Run => FileKind::Run,
-        File::Dispersion => FileKind::Dispersion,
-        File::Stick => FileKind::Stick,
-        File::Gates => FileKind::Gates,
-    });
+    let schema = match args.file {
+        File::Vehicle => schema(FileKind::Vehicle),
+        File::Run => schema(FileKind::Run),
+        File::Dispersion => schema(FileKind::Dispersion),
+        File::Stick => schema(FileKind::Stick),
+        File::Gates => schema(FileKind::Gates),
+        File::Package => package::schema(),
+        File::Report => gate::report_schema(),
+    };
     writeln!(out, "{:#}", schema.as_value())?;
     Ok(PASS)
 }

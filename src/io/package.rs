@@ -181,6 +181,11 @@ fn table_path(layout: &Layout) -> PathBuf {
     Path::new("tables").join(format!("{}.parquet", layout.name))
 }
 
+/// The JSON Schema of [`HEADER`].
+pub fn schema() -> schemars::Schema {
+    schemars::schema_for!(Header)
+}
+
 /// The files of the package in `dir`.
 pub fn files(dir: &Path) -> Vec<PathBuf> {
     let tables = LAYOUTS.iter().map(|layout| dir.join(table_path(layout)));
