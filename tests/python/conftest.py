@@ -16,6 +16,13 @@ ROOT = Path(__file__).parents[2]
 TVSE = Path(os.environ.get("TVSE", ROOT / "target/release/tvse")).resolve()
 
 
+def pytest_sessionfinish(session):
+    """A test that was skipped has shown nothing."""
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if reporter.stats.get("skipped"):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
 def tvse(*arguments):
     """Standard output of the program; it must succeed."""
     done = subprocess.run([TVSE, *map(str, arguments)], capture_output=True, text=True, cwd=ROOT)
