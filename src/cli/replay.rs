@@ -54,8 +54,8 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         return Err(Error::Usage(format!("--case: found {found}; allowed: below {cases}")));
     }
 
-    let run_file = args.run.join(inputs::FOLDER).join(&outline.inputs[0].name);
-    let loaded = io::scenario::load(&run_file)?;
+    let copies = inputs::copies(&args.run, &outline.inputs)?;
+    let loaded = io::scenario::load_copies(&copies)?;
     let (_, digests) = inputs::of(&loaded)?;
     let mut problems = Problems::default();
     for (stored, found) in outline.inputs.iter().zip(&digests).filter(|(a, b)| a != b) {
@@ -69,7 +69,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let all = outline.poles == StoredPoles::All;
     let vehicle = &loaded.vehicle.vehicle;
     let evaluator = Evaluator::new(vehicle, &sampler, definition, all)
-        .map_err(|error| super::run::unprepared(&run_file, &error))?;
+        .map_err(|error| super::run::unprepared(&copies.run, &error))?;
     let mut replay = Replay::default();
     let mut unsolved = Vec::new();
     let record = evaluator.visit(population, args.case, |view| {

@@ -1,9 +1,8 @@
 //! The inputs of a run, copied into its folder so that it can be replayed from there.
 //!
-//! Files keep their places relative to each other, so that the copies find each other as the
-//! originals do.
+//! Files keep their places relative to each other.
 
-use super::scenario::Loaded;
+use super::scenario::{Copies, Loaded};
 use super::{files, package};
 use crate::campaign::outline::Input;
 use crate::problem::Problems;
@@ -41,6 +40,26 @@ pub fn copy(paths: &[PathBuf], run_folder: &Path) -> Result<(), Problems> {
         files::write(&target, &files::read_bytes(path)?)?;
     }
     Ok(())
+}
+
+/// Where the copies of `inputs`, in the order of [`of`], stand in a run's folder.
+///
+/// # Errors
+/// Damage: fewer inputs than every run has.
+pub fn copies(run_folder: &Path, inputs: &[Input]) -> Result<Copies, Problems> {
+    let [run, vehicle, dispersion, package_head, ..] = inputs else {
+        let found = format!("{} inputs", inputs.len());
+        let file = files::name(&run_folder.join(super::manifest::FILE));
+        return Err(Problems::damage(file, "run.inputs", found, "the files of a run"));
+    };
+    let copy = |input: &Input| run_folder.join(FOLDER).join(&input.name);
+    let modal_package = copy(package_head).parent().map_or_else(PathBuf::new, Path::to_owned);
+    Ok(Copies {
+        run: copy(run),
+        vehicle: copy(vehicle),
+        dispersion: copy(dispersion),
+        modal_package,
+    })
 }
 
 /// `path` below the deepest folder that holds all of `paths`, as its parts.

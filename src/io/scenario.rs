@@ -45,17 +45,37 @@ pub struct LoadedVehicle {
 /// Name of the vehicle file inside a vehicle's folder.
 const VEHICLE_FILE: &str = "vehicle.toml";
 
+/// Where copies of the files of a run stand. They name each other as the originals do, which may be
+/// by absolute paths or over symbolic links, so that the copies are not found by these names.
+#[derive(Debug, Clone)]
+pub struct Copies {
+    /// The run file.
+    pub run: PathBuf,
+    /// The vehicle file.
+    pub vehicle: PathBuf,
+    /// The dispersion table.
+    pub dispersion: PathBuf,
+    /// The folder of the modal package.
+    pub modal_package: PathBuf,
+}
+
 /// Reads a vehicle: its file, or the folder that holds it, and its modal package.
 ///
 /// # Errors
 /// All problems of the file and of the package.
 pub fn vehicle(path: &Path) -> Result<LoadedVehicle, Problems> {
+    vehicle_with(path, None)
+}
+
+/// Like [`vehicle`], with the modal package taken from a folder other than the one named.
+fn vehicle_with(path: &Path, package: Option<&Path>) -> Result<LoadedVehicle, Problems> {
     let path = if path.is_dir() { path.join(VEHICLE_FILE) } else { path.to_owned() };
     let name = files::name(&path);
     let text = files::read_text(&path)?;
     let (raw, mut findings) = table::read::<VehicleFile>(&name, &text)?;
-    let modal_package = beside(&path, &raw.modal_package);
-    let modal = named(&path, &raw.modal_package, "modal_package", &mut findings, package::read);
+    let modal_package = package.map_or_else(|| beside(&path, &raw.modal_package), Path::to_owned);
+    let modal =
+        named(&raw.modal_package, &modal_package, "modal_package", &mut findings, package::read);
     let resolved = scenario::vehicle::resolve(&raw, modal, findings)?;
     Ok(LoadedVehicle { resolved, text: (name, text), modal_package })
 }
@@ -65,12 +85,31 @@ pub fn vehicle(path: &Path) -> Result<LoadedVehicle, Problems> {
 /// # Errors
 /// All problems of the run file, the vehicle, the modal package, the dispersion table and the gates.
 pub fn load(path: &Path) -> Result<Loaded, Problems> {
+    load_with(path, None)
+}
+
+/// Reads copies of a run and of everything its results depend on: gates are left out.
+///
+/// # Errors
+/// Those of [`load`].
+pub fn load_copies(copies: &Copies) -> Result<Loaded, Problems> {
+    load_with(&copies.run, Some(copies))
+}
+
+fn load_with(path: &Path, copies: Option<&Copies>) -> Result<Loaded, Problems> {
     let name = files::name(path);
     let text = files::read_text(path)?;
     let (raw, mut findings) = table::read::<RunFile>(&name, &text)?;
 
-    let vehicle = named(path, &raw.vehicle, "vehicle", &mut findings, vehicle);
-    let dispersion = named(path, &raw.dispersion, "dispersion", &mut findings, |file| {
+    let place = |named: &str, copy: fn(&Copies) -> &PathBuf| {
+        copies.map_or_else(|| beside(path, named), |copies| copy(copies).clone())
+    };
+    let at = place(&raw.vehicle, |copies| &copies.vehicle);
+    let vehicle = named(&raw.vehicle, &at, "vehicle", &mut findings, |file| {
+        vehicle_with(file, copies.map(|copies| copies.modal_package.as_path()))
+    });
+    let at = place(&raw.dispersion, |copies| &copies.dispersion);
+    let dispersion = named(&raw.dispersion, &at, "dispersion", &mut findings, |file| {
         let name = files::name(file);
         let text = files::read_text(file)?;
         // Rows are only understood against the vehicle.
@@ -84,8 +123,8 @@ pub fn load(path: &Path) -> Result<Loaded, Problems> {
         };
         Ok((dispersion, (name, text)))
     });
-    let gates = raw.gates.as_ref().and_then(|gates| {
-        named(path, gates, "gates", &mut findings, |file| {
+    let gates = raw.gates.as_ref().filter(|_| copies.is_none()).and_then(|gates| {
+        named(gates, &beside(path, gates), "gates", &mut findings, |file| {
             gate::parse(&files::read_text(file)?, &files::name(file))?;
             Ok(file.to_owned())
         })
@@ -113,25 +152,24 @@ pub fn load(path: &Path) -> Result<Loaded, Problems> {
     })
 }
 
-/// Reads what `file` names at `key`; its problems go to `findings`.
+/// Reads what a file names at `key` as `text`, from `path`; its problems go to `findings`.
 fn named<T>(
-    file: &Path,
-    path: &str,
+    text: &str,
+    path: &Path,
     key: &str,
     findings: &mut table::Findings,
     read: impl FnOnce(&Path) -> Result<T, Problems>,
 ) -> Option<T> {
-    if path.is_empty() {
+    if text.is_empty() {
         findings.push(key, "an empty text", "a path relative to this file");
         return None;
     }
-    let path = beside(file, path);
     if !path.exists() {
         let found = format!("\"{}\", which does not exist", path.display());
         findings.push(key, found, "a path relative to this file");
         return None;
     }
-    read(&path).map_err(|problems| findings.extend(problems)).ok()
+    read(path).map_err(|problems| findings.extend(problems)).ok()
 }
 
 /// `path` relative to the folder of `file`; an absolute path as it is.
