@@ -1,11 +1,14 @@
 """Models, poles and identities against an independent assembly in numpy."""
 
+import shutil
+
 import numpy as np
 import pytest
 import scipy.linalg
 import scipy.optimize
 
 import oracle
+from conftest import ROOT, run_file, tvse
 
 EPSILON = np.finfo(float).eps
 
@@ -111,6 +114,33 @@ def test_eigenvectors_satisfy_their_equations(replayed):
             assert (norms <= limit).all(), (at, norms.max())
         scale = np.einsum("ij,ij->j", w.conj(), v)
         assert np.abs(scale - 1).max() <= limit * np.abs(w).max() * np.abs(v).max()
+
+
+@pytest.mark.parametrize("how", ["gates", "absolute", "links"])
+def test_a_run_is_replayed_from_its_copies_however_it_names_its_inputs(how, tmp_path):
+    home = tmp_path / "home"
+    shutil.copytree(ROOT / "vehicles", home / "vehicles")
+    shutil.copytree(ROOT / "dispersions", home / "dispersions")
+    above, more = "..", ""
+    if how == "gates":
+        shutil.copy(ROOT / "runs/reference.gates.toml", home)
+        more = 'gates = "../reference.gates.toml"\n'
+    elif how == "absolute":
+        above = home
+    else:
+        (tmp_path / "links").mkdir()
+        for name in ["vehicles", "dispersions"]:
+            (tmp_path / "links" / name).symlink_to(home / name)
+        home = tmp_path / "links"
+    (home / "runs").mkdir(exist_ok=True)
+    text = more + run_file(
+        f"{above}/vehicles/sls-like", f"{above}/dispersions/reference.toml", 1, [110.0], ["booster.*"], ["case_only"]
+    )
+    (home / "runs/this.toml").write_text(text)
+    tvse("run", home / "runs/this.toml", "-o", tmp_path / "run")
+    # The originals are gone: what counts is in the run's folder.
+    shutil.rmtree(tmp_path / "home")
+    assert "bit for bit" in tvse("replay", tmp_path / "run", "--case", 0)
 
 
 # ---------------------------------------------------------------- identity
