@@ -53,7 +53,7 @@ fn the_reference_run_holds_what_the_reference_vehicle_page_asks_for() {
         ("nominal", 1, false),
         ("dispersed", 2000, true),
         ("adverse", 1, false),
-        ("adverse_dispersed", 2000, true),
+        ("adverse_dispersed", 500, true),
     ];
     assert_eq!(populations, expected);
     assert_eq!((corners[0].population, corners[0].mode, corners[0].variant), (2, 0, 3));
