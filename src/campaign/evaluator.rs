@@ -308,7 +308,7 @@ impl From<&eigen::Error> for Failure {
             eigen::Error::NonFinite(_) => FailureKind::NonFinite,
             eigen::Error::SingularMass { .. } => FailureKind::SingularMass,
             eigen::Error::NoConvergence => FailureKind::NoConvergence,
-            eigen::Error::Trace { .. } => FailureKind::Residual,
+            eigen::Error::Trace { .. } | eigen::Error::Spread { .. } => FailureKind::Residual,
         };
         Self::new(kind, error.to_string())
     }

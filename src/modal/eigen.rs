@@ -27,6 +27,14 @@ pub enum Error {
     /// The QR iteration did not converge.
     #[error("the QR iteration did not converge")]
     NoConvergence,
+    /// The least pole is lost in the rounding of the greatest.
+    #[error("poles from {least:.2e} to {greatest:.2e} rad/s cannot be told in one model")]
+    Spread {
+        /// Least modulus of a pole, rad/s.
+        least: f64,
+        /// Greatest modulus of a pole, rad/s.
+        greatest: f64,
+    },
     /// Sums of the poles disagree with the traces of the matrix.
     #[error("{what} of the poles is off by {error:.2e}, allowed {bound:.2e}")]
     Trace {
@@ -122,10 +130,12 @@ impl Solver {
         poles.clear();
         self.build_state(model)?;
         let (trace, trace_of_square) = traces(&self.state);
-        nalgebra::linalg::balancing::balance_parlett_reinsch(&mut self.state);
-        if !self.state.iter().all(|v| v.is_finite()) {
-            return Err(Error::NonFinite("the balanced state matrix"));
+        // Balancing compares norms of rows and columns, and would halve an infinite one for ever;
+        // where their sum of squares is finite they all are, and balancing only lowers it.
+        if !self.state.norm_squared().is_finite() {
+            return Err(Error::NonFinite("the square of the state matrix"));
         }
+        nalgebra::linalg::balancing::balance_parlett_reinsch(&mut self.state);
         let states = 2 * self.coordinates;
         evd::evd_real(
             MatRef::from_column_major_slice(self.state.as_slice(), states, states),
@@ -153,6 +163,13 @@ impl Solver {
             if !(error <= bound) {
                 return Err(Error::Trace { what, error, bound });
             }
+        }
+        // The error of a pole is a modest multiple of n ε times the greatest one.
+        let moduli = || all().map(|s| s.norm());
+        let (least, greatest) =
+            moduli().fold((f64::INFINITY, 0.0_f64), |(a, b), s| (a.min(s), b.max(s)));
+        if !(least >= bound * greatest) {
+            return Err(Error::Spread { least, greatest });
         }
         poles.extend(all().filter(|s| s.im >= 0.0));
         poles.sort_by(|a, b| a.im.total_cmp(&b.im).then(a.re.total_cmp(&b.re)));

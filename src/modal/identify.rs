@@ -428,5 +428,15 @@ mod tests {
         assert_eq!(solver.poles(&nan, &mut poles), Err(Error::NonFinite("the model")));
         let singular = model([1.0, 1.1], 1.5, 0.1);
         assert!(matches!(solver.poles(&singular, &mut poles), Err(Error::SingularMass { .. })));
+        // Its square overflows, over which balancing would never end.
+        let mut huge = model([1.0, 1.1], 0.1, 0.1);
+        huge.stiffness[(2, 2)] = 1e300;
+        let overflow = Error::NonFinite("the square of the state matrix");
+        assert_eq!(solver.poles(&huge, &mut poles), Err(overflow));
+        // The poles near 1 rad/s are below the rounding of the greatest.
+        huge.stiffness[(2, 2)] = 1e40;
+        assert!(matches!(solver.poles(&huge, &mut poles), Err(Error::Spread { .. })));
+        huge.stiffness[(2, 2)] = 1e12;
+        assert_eq!(solver.poles(&huge, &mut poles), Ok(()));
     }
 }
