@@ -5,12 +5,11 @@ use crate::campaign::row::{self, ModeRow};
 use crate::campaign::{Evaluator, StoredPoles};
 use crate::dispersion::Sampler;
 use crate::io::replay::Replay;
-use crate::io::{self, Run, inputs};
-use crate::problem::Problems;
+use crate::io::{Run, inputs};
 use crate::report;
 use crate::spelling::allowed_instead;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// One case of a finished run, rebuilt from the inputs stored with the run and its seed alone.
 ///
@@ -24,7 +23,7 @@ pub struct Args {
     /// Folder of the run
     run: PathBuf,
     /// Case index inside its population
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     case: u64,
     /// Population of the case
     #[arg(long, value_name = "NAME", default_value = "dispersed")]
@@ -54,22 +53,13 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         return Err(Error::Usage(format!("--case: found {found}; allowed: below {cases}")));
     }
 
-    let copies = inputs::copies(&args.run, &outline.inputs)?;
-    let loaded = io::scenario::load_copies(&copies)?;
-    let (_, digests) = inputs::of(&loaded)?;
-    let mut problems = Problems::default();
-    for (stored, found) in outline.inputs.iter().zip(&digests).filter(|(a, b)| a != b) {
-        let file = args.run.join(inputs::FOLDER).join(&found.name).display().to_string();
-        let damage = Problems::damage(file, "", "other bytes than at the run", &stored.blake3);
-        problems.extend(damage);
-    }
-    problems.into_result(())?;
+    let loaded = inputs::read(&args.run, &outline.inputs)?;
 
     let sampler = Sampler::new(&loaded.dispersion, definition.seed);
     let all = outline.poles == StoredPoles::All;
     let vehicle = &loaded.vehicle.vehicle;
     let evaluator = Evaluator::new(vehicle, &sampler, definition, all)
-        .map_err(|error| super::run::unprepared(&copies.run, &error))?;
+        .map_err(|error| super::run::unprepared(Path::new(&loaded.run.0), &error))?;
     let mut replay = Replay::default();
     let mut unsolved = Vec::new();
     let record = evaluator.visit(population, args.case, |view| {

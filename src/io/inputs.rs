@@ -1,77 +1,101 @@
 //! The inputs of a run, copied into its folder so that it can be replayed from there.
 //!
-//! Files keep their places relative to each other.
+//! A copy is called by what it is, not by where the original lies: absolute paths, links and
+//! folders of the originals do not matter. How copies are read is decided in `scenario`.
 
-use super::scenario::{Copies, Loaded};
+use super::scenario::{self, Loaded};
 use super::{files, package};
 use crate::campaign::outline::Input;
-use crate::problem::Problems;
+use crate::problem::{Kind, Problems};
 use std::path::{Path, PathBuf};
 
 /// Folder of the copies inside a run's folder.
 pub const FOLDER: &str = "inputs";
+/// Copy of the run file.
+pub const RUN: &str = "run.toml";
+/// Copy of the vehicle file.
+pub const VEHICLE: &str = "vehicle.toml";
+/// Copy of the dispersion table.
+pub const DISPERSION: &str = "dispersion.toml";
+/// Copy of the modal package's folder.
+pub const MODES: &str = "modes";
 
-/// Every file that a loaded run was read from, the run file first, and their digests.
-///
-/// # Errors
-/// A file that can no longer be read.
-pub fn of(loaded: &Loaded) -> Result<(Vec<PathBuf>, Vec<Input>), Problems> {
-    let texts = loaded.texts.iter().map(|(name, _)| PathBuf::from(name));
-    let package = package::files(&loaded.modal_package);
-    let paths =
-        texts.chain(package).map(|path| files::absolute(&path)).collect::<Result<Vec<_>, _>>()?;
-    let input = |path: &PathBuf| {
-        // The name is the same wherever the inputs lie.
-        let name = relative(&paths, path).join("/");
-        Ok(Input { name, blake3: files::digest(path)? })
-    };
-    let inputs = paths.iter().map(input).collect::<Result<Vec<_>, Problems>>()?;
-    Ok((paths, inputs))
-}
+/// The bytes of every input of a run, by the name of its copy; the run file first.
+#[derive(Debug, Clone)]
+pub struct Inputs(Vec<(String, Vec<u8>)>);
 
-/// Copies `paths` into the run's folder.
-///
-/// # Errors
-/// A file that cannot be read or written.
-pub fn copy(paths: &[PathBuf], run_folder: &Path) -> Result<(), Problems> {
-    for path in paths {
-        let target = run_folder.join(FOLDER).join(relative(paths, path).join("/"));
-        files::create_parents(&target)?;
-        files::write(&target, &files::read_bytes(path)?)?;
+impl Inputs {
+    /// The inputs from which `loaded` was read.
+    ///
+    /// # Errors
+    /// A table that can no longer be read.
+    pub fn of(loaded: &Loaded) -> Result<Self, Problems> {
+        let texts = [(RUN, &loaded.run), (VEHICLE, &loaded.vehicle_file)];
+        let texts = texts.into_iter().chain([(DISPERSION, &loaded.dispersion_file)]);
+        let mut inputs: Vec<(String, Vec<u8>)> =
+            texts.map(|(name, (_, text))| (name.into(), text.clone().into_bytes())).collect();
+        let folder = &loaded.modal_package;
+        for path in package::files(folder) {
+            let inside = path.strip_prefix(folder).unwrap_or(&path);
+            inputs.push((format!("{MODES}/{}", slashed(inside)), files::read_bytes(&path)?));
+        }
+        Ok(Self(inputs))
     }
-    Ok(())
+
+    /// Name and digest of every input.
+    pub fn digests(&self) -> Vec<Input> {
+        let digest = |(name, bytes): &(String, Vec<u8>)| Input {
+            name: name.clone(),
+            blake3: files::digest_of(bytes),
+        };
+        self.0.iter().map(digest).collect()
+    }
+
+    /// Writes the copies into the run's folder.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, run_folder: &Path) -> Result<(), Problems> {
+        for (name, bytes) in &self.0 {
+            let target = run_folder.join(FOLDER).join(name);
+            files::create_parents(&target)?;
+            files::write(&target, bytes)?;
+        }
+        Ok(())
+    }
 }
 
-/// Where the copies of `inputs`, in the order of [`of`], stand in a run's folder.
+/// Reads what a run was made from: the copies in its folder, once all are found to be whole.
 ///
 /// # Errors
-/// Damage: fewer inputs than every run has.
-pub fn copies(run_folder: &Path, inputs: &[Input]) -> Result<Copies, Problems> {
-    let [run, vehicle, dispersion, package_head, ..] = inputs else {
-        let found = format!("{} inputs", inputs.len());
-        let file = files::name(&run_folder.join(super::manifest::FILE));
-        return Err(Problems::damage(file, "run.inputs", found, "the files of a run"));
-    };
-    let copy = |input: &Input| run_folder.join(FOLDER).join(&input.name);
-    let modal_package = copy(package_head).parent().map_or_else(PathBuf::new, Path::to_owned);
-    Ok(Copies {
-        run: copy(run),
-        vehicle: copy(vehicle),
-        dispersion: copy(dispersion),
-        modal_package,
-    })
+/// Damage: every copy that is missing or has other bytes than `inputs` says.
+pub fn read(run_folder: &Path, inputs: &[Input]) -> Result<Loaded, Problems> {
+    let folder = run_folder.join(FOLDER);
+    let mut problems = Problems::default();
+    for Input { name, blake3 } in inputs {
+        let path = folder.join(name);
+        let found = match files::digest(&path) {
+            Ok(found) if found == *blake3 => continue,
+            Ok(found) => format!("other bytes than at the run (BLAKE3 {found})"),
+            Err(unread) => unread.0.into_iter().map(|p| p.found).collect::<Vec<_>>().join(", "),
+        };
+        problems.push(Kind::Damage, files::name(&path), "", found, format!("BLAKE3 {blake3}"));
+    }
+    problems.into_result(())?;
+    scenario::load_copies(&folder)
 }
 
-/// `path` below the deepest folder that holds all of `paths`, as its parts.
-fn relative(paths: &[PathBuf], path: &Path) -> Vec<String> {
-    let parts = |path: &Path| -> Vec<String> {
-        path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect()
-    };
-    let first = parts(&paths[0]);
-    let common = paths.iter().fold(first.len() - 1, |common, other| {
-        let other = parts(other);
-        let shared = first.iter().zip(&other).take_while(|(a, b)| a == b).count();
-        common.min(shared).min(other.len() - 1)
-    });
-    parts(path).split_off(common)
+/// A path inside a folder, the same text on every system.
+fn slashed(path: &Path) -> String {
+    let parts: Vec<_> = path.components().map(|c| c.as_os_str().to_string_lossy()).collect();
+    parts.join("/")
+}
+
+/// Where the copy of what a file names at `key` lies.
+pub fn copy_of(folder: &Path, key: &str) -> PathBuf {
+    folder.join(match key {
+        "vehicle" => VEHICLE,
+        "dispersion" => DISPERSION,
+        _ => MODES,
+    })
 }

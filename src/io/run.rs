@@ -14,15 +14,16 @@ use arrow::array::{Array, AsArray};
 use arrow::datatypes::{DataType, Field, Float64Type, Int64Type};
 use arrow::record_batch::RecordBatch;
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader,
+    ParquetRecordBatchReaderBuilder,
+};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-type Builder = ParquetRecordBatchReaderBuilder<File>;
+use std::sync::{Arc, OnceLock};
 
 /// Rows decoded at once.
 const BATCH: usize = 8192;
@@ -33,6 +34,8 @@ pub struct Run {
     folder: PathBuf,
     outline: Outline,
     contents: BTreeMap<TableName, Content>,
+    /// Checked footers, by table: they are long where populations are many.
+    footers: [OnceLock<ArrowReaderMetadata>; TableName::ALL.len()],
 }
 
 /// The draws of one stored case; none where a value stays nominal, has no score, or the case
@@ -97,7 +100,7 @@ impl Run {
         outline: Outline,
         contents: BTreeMap<TableName, Content>,
     ) -> Self {
-        Self { folder: folder.to_owned(), outline, contents }
+        Self { folder: folder.to_owned(), outline, contents, footers: Default::default() }
     }
 
     pub(super) fn insert(&mut self, table: TableName, content: Content) {
@@ -244,22 +247,45 @@ impl Run {
         Ok(found)
     }
 
-    /// Opens a table and checks its columns, rows and row groups.
-    fn checked(&self, table: TableName) -> Result<Builder, Problems> {
-        let file = files::open(&self.path(table))
-            .map_err(|error| self.damage(table, error.to_string(), "a readable table"))?;
-        let builder = decoded(|| Builder::try_new(file))
+    fn opened(&self, table: TableName) -> Result<File, Problems> {
+        files::open(&self.path(table))
+            .map_err(|error| self.damage(table, error.to_string(), "a readable table"))
+    }
+
+    /// The footer of a table, checked when first asked for.
+    fn footer(&self, table: TableName) -> Result<ArrowReaderMetadata, Problems> {
+        let known = &self.footers[table as usize];
+        match known.get() {
+            Some(footer) => Ok(footer.clone()),
+            None => self.checked(table).map(|footer| known.get_or_init(|| footer).clone()),
+        }
+    }
+
+    /// Reads the footer of a table and checks its run, columns, rows and row groups.
+    fn checked(&self, table: TableName) -> Result<ArrowReaderMetadata, Problems> {
+        let file = self.opened(table)?;
+        let footer = decoded(|| ArrowReaderMetadata::load(&file, ArrowReaderOptions::new()))
             .map_err(|found| self.damage(table, found, "a Parquet table"))?;
         let allowed = table.fields(&self.outline);
         let same = |(found, allowed): (&Arc<Field>, &Field)| {
             found.name() == allowed.name() && found.data_type() == allowed.data_type()
         };
-        let found = builder.schema().fields();
+        let found = footer.schema().fields();
         if found.len() != allowed.len() || !found.iter().zip(&allowed).all(same) {
             return Err(self.damage(table, "other columns", "the columns of the data dictionary"));
         }
+        // Tables and manifest tell the same run, so that neither can be altered alone.
+        let pairs = footer.metadata().file_metadata().key_value_metadata();
+        let says = |key: &str| pairs?.iter().find(|pair| pair.key == key)?.value.as_deref();
+        let text = serde_json::to_string(&self.outline).expect("an outline has text keys only");
+        for (key, allowed) in super::results::metadata(table, &text) {
+            if says(key) != Some(&allowed) {
+                let allowed = format!("that of {}", super::manifest::FILE);
+                return Err(self.damage(table, format!("another `{key}`"), allowed));
+            }
+        }
         let rows = self.contents[&table].rows;
-        let found = builder.metadata().file_metadata().num_rows();
+        let found = footer.metadata().file_metadata().num_rows();
         if u64::try_from(found) != Ok(rows) {
             return Err(self.damage(table, format!("{found} rows"), format!("{rows} rows")));
         }
@@ -269,12 +295,12 @@ impl Run {
             }
             _ => u64::from(rows > 0),
         };
-        let found = builder.metadata().num_row_groups();
+        let found = footer.metadata().num_row_groups();
         if found as u64 != groups {
             let allowed = format!("{groups} row groups");
             return Err(self.damage(table, format!("{found} row groups"), allowed));
         }
-        Ok(builder)
+        Ok(footer)
     }
 
     /// Number of row groups of some populations in a table that follows the cases.
@@ -291,7 +317,9 @@ impl Run {
         population: usize,
         cases: &Range<u64>,
     ) -> Result<ParquetRecordBatchReader, Problems> {
-        let builder = self.checked(table)?;
+        let footer = self.footer(table)?;
+        let builder =
+            ParquetRecordBatchReaderBuilder::new_with_metadata(self.opened(table)?, footer);
         let populations = &self.outline.definition.populations;
         let (size, end) =
             (table.group_cases(&self.outline), cases.end.min(populations[population].cases));
@@ -551,5 +579,39 @@ mod tests {
         assert_eq!(Run::open(&path).unwrap_err().kind(), Kind::Damage);
         fs::remove_file(&file).unwrap();
         assert!(Run::open(&path).unwrap_err().to_string().contains("unfinished"));
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::prelude::ProptestConfig::with_cases(64))]
+        #[test]
+        fn an_altered_manifest_is_refused_or_tells_the_same_run(
+            edits in proptest::collection::vec((0.0..1.0_f64, 0_usize..20, "[a-z0-9.,\\[\\]{}\":\n -]{0,6}"), 1..4)
+        ) {
+            static MADE: OnceLock<(tempfile::TempDir, PathBuf, String)> = OnceLock::new();
+            let (place, path, text) = MADE.get_or_init(|| {
+                let place = tempfile::tempdir().unwrap();
+                let path = finished(place.path(), &[1, 5], StoredPoles::Named);
+                let text = fs::read_to_string(path.join(manifest::FILE)).unwrap();
+                (place, path, text)
+            });
+            let whole: Manifest = serde_json::from_str(text).unwrap();
+            let mut letters: Vec<char> = text.chars().collect();
+            for (at, length, put) in edits {
+                let from = (at * letters.len() as f64) as usize;
+                let to = (from + length).min(letters.len());
+                letters.splice(from..to, put.chars());
+            }
+            let folder = tempfile::tempdir_in(place.path()).unwrap();
+            fs::create_dir(folder.path().join("tables")).unwrap();
+            for table in TableName::ALL {
+                fs::hard_link(path.join(table.file()), folder.path().join(table.file())).unwrap();
+            }
+            let altered: String = letters.into_iter().collect();
+            fs::write(folder.path().join(manifest::FILE), altered).unwrap();
+            match Run::open(folder.path()) {
+                Ok(run) => proptest::prop_assert_eq!(run.outline(), &whole.run),
+                Err(problems) => proptest::prop_assert_eq!(problems.kind(), Kind::Damage),
+            }
+        }
     }
 }

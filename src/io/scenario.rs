@@ -2,7 +2,7 @@
 //!
 //! What the files say is understood in `scenario`; paths in a file are relative to that file.
 
-use super::{files, package};
+use super::{files, inputs, package};
 use crate::campaign::Definition;
 use crate::dispersion::Dispersion;
 use crate::gate;
@@ -25,8 +25,12 @@ pub struct Loaded {
     pub corners: Vec<Corner>,
     /// The gate file, if the run names one.
     pub gates: Option<PathBuf>,
-    /// The files that were read: their names as a user would name them, and their texts.
-    pub texts: Vec<(String, String)>,
+    /// Name of the run file as a user would name it, and its text.
+    pub run: (String, String),
+    /// Name and text of the vehicle file.
+    pub vehicle_file: (String, String),
+    /// Name and text of the dispersion table.
+    pub dispersion_file: (String, String),
     /// The folder of the modal package.
     pub modal_package: PathBuf,
 }
@@ -45,18 +49,23 @@ pub struct LoadedVehicle {
 /// Name of the vehicle file inside a vehicle's folder.
 const VEHICLE_FILE: &str = "vehicle.toml";
 
-/// Where copies of the files of a run stand. They name each other as the originals do, which may be
-/// by absolute paths or over symbolic links, so that the copies are not found by these names.
-#[derive(Debug, Clone)]
-pub struct Copies {
-    /// The run file.
-    pub run: PathBuf,
-    /// The vehicle file.
-    pub vehicle: PathBuf,
-    /// The dispersion table.
-    pub dispersion: PathBuf,
-    /// The folder of the modal package.
-    pub modal_package: PathBuf,
+/// Where the files lie that a file names.
+#[derive(Clone, Copy)]
+enum Place<'a> {
+    /// Where it says, relative to itself.
+    Named,
+    /// Among the copies of a run's inputs in this folder, whatever it says.
+    Copies(&'a Path),
+}
+
+impl Place<'_> {
+    /// What `file` names `path` at `key`.
+    fn find(self, file: &Path, path: &str, key: &str) -> PathBuf {
+        match self {
+            Self::Named => file.parent().unwrap_or(Path::new("")).join(path),
+            Self::Copies(folder) => inputs::copy_of(folder, key),
+        }
+    }
 }
 
 /// Reads a vehicle: its file, or the folder that holds it, and its modal package.
@@ -64,18 +73,17 @@ pub struct Copies {
 /// # Errors
 /// All problems of the file and of the package.
 pub fn vehicle(path: &Path) -> Result<LoadedVehicle, Problems> {
-    vehicle_with(path, None)
+    vehicle_from(path, Place::Named)
 }
 
-/// Like [`vehicle`], with the modal package taken from a folder other than the one named.
-fn vehicle_with(path: &Path, package: Option<&Path>) -> Result<LoadedVehicle, Problems> {
+fn vehicle_from(path: &Path, place: Place<'_>) -> Result<LoadedVehicle, Problems> {
     let path = if path.is_dir() { path.join(VEHICLE_FILE) } else { path.to_owned() };
     let name = files::name(&path);
     let text = files::read_text(&path)?;
     let (raw, mut findings) = table::read::<VehicleFile>(&name, &text)?;
-    let modal_package = package.map_or_else(|| beside(&path, &raw.modal_package), Path::to_owned);
-    let modal =
-        named(&raw.modal_package, &modal_package, "modal_package", &mut findings, package::read);
+    let modal_package = place.find(&path, &raw.modal_package, "modal_package");
+    let at = (raw.modal_package.as_str(), modal_package.as_path());
+    let modal = named(at, "modal_package", &mut findings, package::read);
     let resolved = scenario::vehicle::resolve(&raw, modal, findings)?;
     Ok(LoadedVehicle { resolved, text: (name, text), modal_package })
 }
@@ -85,31 +93,28 @@ fn vehicle_with(path: &Path, package: Option<&Path>) -> Result<LoadedVehicle, Pr
 /// # Errors
 /// All problems of the run file, the vehicle, the modal package, the dispersion table and the gates.
 pub fn load(path: &Path) -> Result<Loaded, Problems> {
-    load_with(path, None)
+    load_from(path, Place::Named)
 }
 
-/// Reads copies of a run and of everything its results depend on: gates are left out.
+/// Reads the copies of a run's inputs in `folder`; gates are none of them.
 ///
 /// # Errors
-/// Those of [`load`].
-pub fn load_copies(copies: &Copies) -> Result<Loaded, Problems> {
-    load_with(&copies.run, Some(copies))
+/// As for [`load`].
+pub(super) fn load_copies(folder: &Path) -> Result<Loaded, Problems> {
+    load_from(&folder.join(inputs::RUN), Place::Copies(folder))
 }
 
-fn load_with(path: &Path, copies: Option<&Copies>) -> Result<Loaded, Problems> {
+fn load_from(path: &Path, place: Place<'_>) -> Result<Loaded, Problems> {
     let name = files::name(path);
     let text = files::read_text(path)?;
     let (raw, mut findings) = table::read::<RunFile>(&name, &text)?;
 
-    let place = |named: &str, copy: fn(&Copies) -> &PathBuf| {
-        copies.map_or_else(|| beside(path, named), |copies| copy(copies).clone())
-    };
-    let at = place(&raw.vehicle, |copies| &copies.vehicle);
-    let vehicle = named(&raw.vehicle, &at, "vehicle", &mut findings, |file| {
-        vehicle_with(file, copies.map(|copies| copies.modal_package.as_path()))
-    });
-    let at = place(&raw.dispersion, |copies| &copies.dispersion);
-    let dispersion = named(&raw.dispersion, &at, "dispersion", &mut findings, |file| {
+    let found = place.find(path, &raw.vehicle, "vehicle");
+    let at = (raw.vehicle.as_str(), found.as_path());
+    let vehicle = named(at, "vehicle", &mut findings, |file| vehicle_from(file, place));
+    let found = place.find(path, &raw.dispersion, "dispersion");
+    let at = (raw.dispersion.as_str(), found.as_path());
+    let dispersion = named(at, "dispersion", &mut findings, |file| {
         let name = files::name(file);
         let text = files::read_text(file)?;
         // Rows are only understood against the vehicle.
@@ -123,39 +128,41 @@ fn load_with(path: &Path, copies: Option<&Copies>) -> Result<Loaded, Problems> {
         };
         Ok((dispersion, (name, text)))
     });
-    let gates = raw.gates.as_ref().filter(|_| copies.is_none()).and_then(|gates| {
-        named(gates, &beside(path, gates), "gates", &mut findings, |file| {
+    let gates = raw.gates.as_ref().filter(|_| matches!(place, Place::Named));
+    let gates = gates.and_then(|gates| {
+        let found = place.find(path, gates, "gates");
+        named((gates, &found), "gates", &mut findings, |file| {
             gate::parse(&files::read_text(file)?, &files::name(file))?;
             Ok(file.to_owned())
         })
     });
-    let (dispersion, dispersion_text) = dispersion.unzip();
+    let (dispersion, dispersion_file) = dispersion.unzip();
     let dispersion = dispersion.flatten();
     let stem = path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy().into_owned());
     let resolved = vehicle.as_ref().map(|v| &v.resolved);
     let Run { definition, corners } =
         scenario::run::resolve(&raw, &stem, resolved, dispersion.as_ref(), findings)?;
-    let mut texts = vec![(name, text)];
     // What could not be read is among the problems already returned.
-    let missing = || Problems::input(&texts[0].0, "", "an incomplete scenario", "all its files");
+    let missing = || Problems::input(&name, "", "an incomplete scenario", "all its files");
     let (vehicle, dispersion) = (vehicle.ok_or_else(missing)?, dispersion.ok_or_else(missing)?);
-    texts.push(vehicle.text);
-    texts.extend(dispersion_text);
+    let dispersion_file = dispersion_file.ok_or_else(missing)?;
     Ok(Loaded {
         vehicle: vehicle.resolved,
         dispersion,
         definition,
         corners,
         gates,
-        texts,
+        run: (name, text),
+        vehicle_file: vehicle.text,
+        dispersion_file,
         modal_package: vehicle.modal_package,
     })
 }
 
-/// Reads what a file names at `key` as `text`, from `path`; its problems go to `findings`.
+/// Reads what a file names at `key`, given what stands there and the path that is meant; its
+/// problems go to `findings`.
 fn named<T>(
-    text: &str,
-    path: &Path,
+    (text, path): (&str, &Path),
     key: &str,
     findings: &mut table::Findings,
     read: impl FnOnce(&Path) -> Result<T, Problems>,
@@ -170,11 +177,6 @@ fn named<T>(
         return None;
     }
     read(path).map_err(|problems| findings.extend(problems)).ok()
-}
-
-/// `path` relative to the folder of `file`; an absolute path as it is.
-fn beside(file: &Path, path: &str) -> PathBuf {
-    file.parent().unwrap_or(Path::new("")).join(path)
 }
 
 #[cfg(test)]
@@ -207,12 +209,11 @@ mod tests {
         let (_place, study) = edited("runs/smoke.toml", "sls-like\"", "sls-like/vehicle.toml\"");
         let loaded = load(&study.join("runs/smoke.toml")).unwrap();
         assert_eq!(loaded.definition.name, "smoke");
-        assert_eq!(loaded.texts.len(), 3);
-        for (name, text) in &loaded.texts {
+        for (name, text) in [&loaded.run, &loaded.vehicle_file, &loaded.dispersion_file] {
             assert_eq!(&files::read_text(Path::new(name)).unwrap(), text);
         }
         let by_folder = vehicle(&study.join("vehicles/sls-like")).unwrap();
-        assert!(by_folder.text.1 == loaded.texts[1].1);
+        assert!(by_folder.text.1 == loaded.vehicle_file.1);
         let reference = load(&study.join("runs/reference.toml")).unwrap();
         assert!(reference.gates.unwrap().ends_with("reference.gates.toml"));
     }
