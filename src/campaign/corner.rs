@@ -25,11 +25,15 @@ pub enum Error {
         /// Why, at the high side.
         message: String,
     },
+    /// The search was stopped before its end.
+    #[error("stopped")]
+    Stopped,
 }
 
 /// The adverse side of each of `draws` (indices of draws that have `worst` values): the one that
 /// gives `mode` in `variant` (indices in `definition`) the lesser damping ratio, at its least over
 /// the flight times and over both branches. All other draws are nominal. An impossible side loses.
+/// Once `stop` is set no case is begun.
 ///
 /// # Errors
 /// See [`Error`].
@@ -40,6 +44,7 @@ pub fn adverse_sides(
     draws: &[usize],
     (mode, variant): (usize, usize),
     pool: &Pool,
+    stop: &AtomicBool,
 ) -> Result<Vec<(usize, f64)>, Error> {
     let sides = |&draw: &usize| {
         let worst = dispersion.draws()[draw].worst.unwrap_or_default();
@@ -68,9 +73,10 @@ pub fn adverse_sides(
             Ok(())
         },
         |_| (),
-        &AtomicBool::new(false),
+        stop,
     );
     match done {
+        Ok(progress) if progress.done < progress.total => return Err(Error::Stopped),
         Ok(_) => {}
         Err(never) => match never {},
     }

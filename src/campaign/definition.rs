@@ -4,6 +4,9 @@ pub use crate::dynamics::NozzleJet;
 
 use serde::{Deserialize, Serialize};
 
+/// Most cases of a population: beyond any campaign, and small enough for every count and column.
+pub const MOST_CASES: u64 = 1_000_000_000;
+
 /// Where the gimbal slope comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

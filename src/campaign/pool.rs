@@ -18,6 +18,9 @@ const BLOCK: usize = 4;
 /// records are written.
 const BLOCKS_PER_THREAD: usize = 8;
 
+/// What the names of a pool's threads begin with.
+pub const THREAD: &str = "case-";
+
 /// Consecutive cases of one population.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Span {
@@ -60,7 +63,7 @@ impl Pool {
     pub fn new(jobs: usize) -> Result<Self, rayon::ThreadPoolBuildError> {
         let threads = rayon::ThreadPoolBuilder::new()
             .num_threads(jobs.max(1))
-            .thread_name(|index| format!("case-{index}"))
+            .thread_name(|index| format!("{THREAD}{index}"))
             .build()?;
         Ok(Self { threads })
     }

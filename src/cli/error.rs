@@ -22,6 +22,14 @@ pub enum Error {
     /// Wrong usage (exit code 2).
     #[error("{0}")]
     Usage(String),
+    /// A signal asked the command to stop (exit code 128 and the signal's number).
+    #[error("{message}")]
+    Stopped {
+        /// How far the command came, and what is left of it.
+        message: String,
+        /// The exit code.
+        code: u8,
+    },
     /// Incomplete data or nothing evaluated (exit code 3).
     #[error("{0}")]
     Incomplete(String),
@@ -37,6 +45,7 @@ impl Error {
             },
             Self::File { .. } | Self::Output(_) | Self::Usage(_) => super::USAGE,
             Self::Incomplete(_) => super::INCOMPLETE,
+            Self::Stopped { code, .. } => *code,
         }
     }
 }

@@ -10,6 +10,7 @@ pub mod error;
 pub mod gate;
 pub mod how_many;
 pub mod init;
+pub mod interrupt;
 pub mod modes;
 pub mod nominal;
 pub mod plan;
@@ -22,8 +23,9 @@ pub mod summary;
 
 pub use error::Error;
 
+use crate::campaign::pool;
 use clap::{Parser, Subcommand};
-use std::io::{ErrorKind, Write};
+use std::io::{self, ErrorKind, StdoutLock, Write};
 use std::process::ExitCode;
 
 /// Exit code: everything asked for holds.
@@ -63,10 +65,43 @@ enum Command {
     Completions(completions::Args),
 }
 
+/// The standard output. A reader that closed the pipe has what it wants: the command goes on, and
+/// its exit code stays its own.
+struct Output(StdoutLock<'static>);
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        unless_closed(self.0.write(bytes), bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        unless_closed(self.0.flush(), ())
+    }
+}
+
+fn unless_closed<T>(result: io::Result<T>, closed: T) -> io::Result<T> {
+    match result {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(closed),
+        other => other,
+    }
+}
+
+/// A case that panics is a row of its run, message and all; only other panics are printed.
+fn silence_panics_of_cases() {
+    let print = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let thread = std::thread::current();
+        if !thread.name().is_some_and(|name| name.starts_with(pool::THREAD)) {
+            print(panic);
+        }
+    }));
+}
+
 /// Parses the arguments of the process, runs the command and returns the exit code.
 pub fn run() -> ExitCode {
+    silence_panics_of_cases();
     let arguments = Arguments::parse();
-    let mut out = std::io::stdout().lock();
+    let mut out = Output(io::stdout().lock());
     let result: Result<u8, Error> = match &arguments.command {
         Command::Init(args) => init::run(args, &mut out),
         Command::Check(args) => check::run(args, &mut out),
@@ -85,8 +120,6 @@ pub fn run() -> ExitCode {
     };
     let code = match result.and_then(|code| Ok(out.flush().map(|()| code)?)) {
         Ok(code) => code,
-        // A reader that closed the pipe has what it wants.
-        Err(Error::Output(error)) if error.kind() == ErrorKind::BrokenPipe => PASS,
         Err(error) => {
             eprintln!("{error}");
             error.code()

@@ -37,12 +37,13 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     definition.populations.retain(|_| index.next().is_none_or(|index| !open.contains(&index)));
     let sampler = Sampler::new(&loaded.dispersion, definition.seed);
     let draws = loaded.dispersion.draws();
-    write!(out, "{}", report::plan::table(&definition, draws, &sampler))?;
+    let mut text = report::plan::table(&definition, draws, &sampler);
     if let Some(path) = &args.output {
         let columns = draws.iter().map(DrawColumn::of).collect();
         let outline = Outline::new(definition, StoredPoles::Named, columns, Vec::new());
         let rows = io::plan::write(path, &outline, &sampler)?;
-        writeln!(out, "{}: {rows} rows", path.display())?;
+        text += &format!("{}: {rows} rows\n", path.display());
     }
+    out.write_all(text.as_bytes())?;
     Ok(PASS)
 }

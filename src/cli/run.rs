@@ -1,16 +1,20 @@
 //! `tvse run`: the campaign.
 
+use super::interrupt::Interrupt;
 use super::{Error, PASS, gate, progress};
+use crate::campaign::definition::MOST_CASES;
 use crate::campaign::evaluator::Evaluator;
-use crate::campaign::{Outline, Pool, StoredPoles, corner, outline::DrawColumn, pool};
+use crate::campaign::{Outline, Pool, Progress, StoredPoles, corner, outline::DrawColumn, pool};
 use crate::dispersion::Sampler;
-use crate::io::{self, Results, inputs};
+use crate::io::inputs::Inputs;
+use crate::io::{self, Results};
 use crate::problem::Problems;
 use crate::report::story;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
+/// Most threads: more would not help, and a mistyped number not stop the machine.
+const MOST_JOBS: i64 = 1024;
 /// Worst cases stored for each population, variant and mode.
 const WORST: usize = 10;
 
@@ -29,13 +33,15 @@ pub struct Args {
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Threads (default: all processors); results do not depend on it
-    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, short, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u16).range(1..=MOST_JOBS))]
     jobs: Option<u16>,
     /// Cases of every drawn population, instead of the run definition's
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u64).range(1..=MOST_CASES))]
     cases: Option<u64>,
     /// Seed, instead of the run definition's
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seed: Option<u64>,
     /// Gates to hold the results against; the exit code is theirs (see `tvse gate`)
     #[arg(long, value_name = "FILE")]
@@ -57,15 +63,12 @@ enum Poles {
 /// Runs the command.
 ///
 /// # Errors
-/// All problems of the run and what it names; an output folder that exists or cannot be written.
+/// All problems of the run and what it names; an output folder that exists or cannot be written; a
+/// signal that asks to stop. Then nothing is left behind.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let mut loaded = io::scenario::load(&args.run)?;
     let folder = args.output.clone().unwrap_or_else(|| args.run.with_extension(""));
-    if folder.exists() {
-        let allowed = "the name of a new folder (see --output)";
-        let folder = folder.display().to_string();
-        return Err(Problems::input(folder, "", "something that exists", allowed).into());
-    }
+    io::files::refuse_existing(&folder)?;
     if let Some(gates) = &args.gates {
         crate::gate::parse(&io::files::read_text(gates)?, &io::files::name(gates))?;
     }
@@ -78,8 +81,9 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     }
     let jobs = args.jobs.map_or_else(processors, usize::from);
     let pool = Pool::new(jobs).map_err(|e| Error::Usage(format!("--jobs {jobs}: {e}")))?;
-    let (paths, digests) = inputs::of(&loaded)?;
-    fix_corners(&mut loaded, &pool, &args.run)?;
+    let inputs = Inputs::of(&loaded)?;
+    let interrupt = Interrupt::listen().map_err(|e| Error::Usage(format!("signals: {e}")))?;
+    fix_corners(&mut loaded, &pool, &args.run, &interrupt)?;
 
     let vehicle = &loaded.vehicle.vehicle;
     let poles = match args.poles {
@@ -87,24 +91,28 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         Poles::All => StoredPoles::All,
     };
     let draws = loaded.dispersion.draws().iter().map(DrawColumn::of).collect();
-    let outline = Outline::new(loaded.definition.clone(), poles, draws, digests);
+    let outline = Outline::new(loaded.definition.clone(), poles, draws, inputs.digests());
     let mut results = Results::create(&folder, outline)?;
-    inputs::copy(&paths, &folder)?;
+    inputs.write(&folder)?;
     let sampler = Sampler::new(&loaded.dispersion, loaded.definition.seed);
     let all = poles == StoredPoles::All;
     let evaluator = Evaluator::new(vehicle, &sampler, &loaded.definition, all)
         .map_err(|error| unprepared(&args.run, &error))?;
     let spans = pool::spans(&loaded.definition.populations);
     let bar = progress::bar(spans.iter().map(|span| span.cases.end).sum());
-    pool.run(
+    let progress = pool.run(
         &loaded.definition,
         &spans,
         |population, case| evaluator.evaluate(population, case),
         |record| results.push(record),
         |done| progress::show(&bar, done),
-        &AtomicBool::new(false),
+        interrupt.stop(),
     )?;
     bar.finish_and_clear();
+    if progress.done < progress.total {
+        let Progress { done, total, .. } = progress;
+        return Err(stopped(&interrupt, &format!("after {done} of {total} cases")));
+    }
     let finished = results.finish(jobs, WORST)?;
     write!(
         out,
@@ -126,6 +134,7 @@ fn fix_corners(
     loaded: &mut io::scenario::Loaded,
     pool: &Pool,
     run_file: &Path,
+    interrupt: &Interrupt,
 ) -> Result<(), Error> {
     for corner in &loaded.corners {
         let fixed = corner::adverse_sides(
@@ -135,14 +144,24 @@ fn fix_corners(
             &corner.draws,
             (corner.mode, corner.variant),
             pool,
+            interrupt.stop(),
         )
-        .map_err(|error| unprepared(run_file, &error))?;
+        .map_err(|error| match error {
+            corner::Error::Stopped => stopped(interrupt, "before the first case"),
+            error => unprepared(run_file, &error),
+        })?;
         let open: Vec<usize> = corner.populations(&loaded.definition.populations).collect();
         for population in open {
             loaded.definition.populations[population].fixed.clone_from(&fixed);
         }
     }
     Ok(())
+}
+
+/// The end of a run that a signal stopped.
+fn stopped(interrupt: &Interrupt, after: &str) -> Error {
+    let message = format!("stopped {after}; nothing is kept of the run");
+    Error::Stopped { message, code: interrupt.code() }
 }
 
 /// The problem of a scenario that reads well but whose nominal vehicle cannot be evaluated.

@@ -88,7 +88,8 @@ pub fn create_folder(path: &Path) -> Result<(), Problems> {
 /// One problem if something of that name exists.
 pub fn refuse_existing(path: &Path) -> Result<(), Problems> {
     if fs::symlink_metadata(path).is_ok() {
-        return Err(Problems::input(name(path), "", "something that exists", "a new name"));
+        let allowed = "a new name that nothing has yet";
+        return Err(Problems::input(name(path), "", "something that exists", allowed));
     }
     Ok(())
 }
@@ -110,12 +111,10 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Problems> {
     fs::read(path).map_err(|e| problem(path, &e, "a readable file"))
 }
 
-/// The absolute path of a file that exists, without links.
-///
-/// # Errors
-/// One problem if it is missing.
-pub fn absolute(path: &Path) -> Result<PathBuf, Problems> {
-    path.canonicalize().map_err(|e| problem(path, &e, "a readable file"))
+/// Removes a folder with all that is in it, as far as the system lets it go.
+pub fn remove_folder(path: &Path) {
+    // What cannot be removed, or is gone already, is no error of this call.
+    let _ = fs::remove_dir_all(path);
 }
 
 /// Removes a folder if it is empty; anything else stays as it is.

@@ -6,6 +6,7 @@
 
 use super::column::Column;
 use super::files::{self, Aside};
+use super::inputs;
 use super::manifest::{self, Execution, Manifest};
 use super::run::Run;
 use super::schema::{self, TableName};
@@ -16,6 +17,7 @@ use crate::campaign::row::{self, CaseRow, ModeRow};
 use crate::campaign::summary::{SummaryRow, WorstRow};
 use crate::campaign::{Outline, Record};
 use crate::problem::{Kind, Problems};
+use parquet::errors::ParquetError;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -23,8 +25,16 @@ use std::time::SystemTime;
 
 /// The results of a run that is under way.
 ///
-/// Dropped before [`Results::finish`] it leaves nothing behind.
+/// Dropped before [`Results::finish`] has succeeded it leaves nothing behind, copies of inputs
+/// included.
 pub struct Results {
+    // Dropped first, so that the folder is rid of the files written aside when it goes.
+    tables: Tables,
+    folder: Folder,
+}
+
+/// The tables and the manifest being written.
+struct Tables {
     outline: Outline,
     cases: Table<CaseRow>,
     modes: Table<ModeRow>,
@@ -34,8 +44,6 @@ pub struct Results {
     manifest: Aside,
     last: Option<(usize, u64)>,
     started: SystemTime,
-    // Dropped last, when the files written aside are gone.
-    folder: Folder,
 }
 
 /// A finished run with the summary that was stored.
@@ -60,20 +68,21 @@ impl Results {
         let started = SystemTime::now();
         let text = serde_json::to_string(&outline).expect("an outline has text keys only");
         files::create_folder(folder)?;
-        let folder = Folder(folder.to_owned());
-        files::create_folder(&folder.0.join("tables"))?;
-        Ok(Self {
-            cases: open(&folder.0, TableName::Cases, schema::cases(&outline), &text)?,
-            modes: open(&folder.0, TableName::Modes, schema::modes(&outline), &text)?,
-            summary: open(&folder.0, TableName::Summary, schema::summary(&outline), &text)?,
-            worst: open(&folder.0, TableName::Worst, schema::worst(&outline), &text)?,
-            columns: open(&folder.0, TableName::Columns, schema::columns(), &text)?,
-            manifest: Aside::beside(&folder.0.join(manifest::FILE))?,
+        let folder = Folder { path: folder.to_owned(), keep: false };
+        let path = &folder.path;
+        files::create_folder(&path.join(TABLES))?;
+        let tables = Tables {
+            cases: open(path, TableName::Cases, schema::cases(&outline), &text)?,
+            modes: open(path, TableName::Modes, schema::modes(&outline), &text)?,
+            summary: open(path, TableName::Summary, schema::summary(&outline), &text)?,
+            worst: open(path, TableName::Worst, schema::worst(&outline), &text)?,
+            columns: open(path, TableName::Columns, schema::columns(), &text)?,
+            manifest: Aside::beside(&path.join(manifest::FILE))?,
             last: None,
             started,
             outline,
-            folder,
-        })
+        };
+        Ok(Self { tables, folder })
     }
 
     /// Takes the record of the next case; cases come in the order of population and case.
@@ -81,6 +90,30 @@ impl Results {
     /// # Errors
     /// An input problem if the disk is full or gone.
     pub fn push(&mut self, record: Record) -> Result<(), Problems> {
+        self.tables.push(record, &self.folder.path)
+    }
+
+    /// Finishes the tables of cases and modes, sums them up, and writes the manifest; `worst` is
+    /// the number of worst cases kept for each population, variant and named mode.
+    ///
+    /// # Errors
+    /// An input problem if the disk is full or gone; then nothing is left behind.
+    ///
+    /// # Panics
+    /// If cases of the outline are missing.
+    pub fn finish(self, jobs: usize, worst: usize) -> Result<Finished, Problems> {
+        let Self { tables, mut folder } = self;
+        let finished = tables.finish(&folder.path, jobs, worst)?;
+        folder.keep = true;
+        Ok(finished)
+    }
+}
+
+impl Tables {
+    fn push(&mut self, record: Record, folder: &Path) -> Result<(), Problems> {
+        let problem = |name: TableName, error: &ParquetError| {
+            table::problem(&folder.join(name.file()), error)
+        };
         let (population, case) = (record.population, record.case);
         assert!(self.last < Some((population, case)), "cases come in order");
         if let Some((before, last)) = self.last {
@@ -89,10 +122,10 @@ impl Results {
                 before != population || last / cases != case / cases
             };
             if another(TableName::Cases) {
-                self.cases.end_group().map_err(|e| self.problem(TableName::Cases, &e))?;
+                self.cases.end_group().map_err(|e| problem(TableName::Cases, &e))?;
             }
             if another(TableName::Modes) {
-                self.modes.end_group().map_err(|e| self.problem(TableName::Modes, &e))?;
+                self.modes.end_group().map_err(|e| problem(TableName::Modes, &e))?;
             }
         }
         self.last = Some((population, case));
@@ -102,17 +135,8 @@ impl Results {
         Ok(())
     }
 
-    /// Finishes the tables of cases and modes, sums them up, and writes the manifest; `worst` is
-    /// the number of worst cases kept for each population, variant and named mode.
-    ///
-    /// # Errors
-    /// An input problem if the disk is full or gone.
-    ///
-    /// # Panics
-    /// If cases of the outline are missing.
-    pub fn finish(self, jobs: usize, worst: usize) -> Result<Finished, Problems> {
-        let Self { outline, cases, modes, started, folder, mut manifest, .. } = self;
-        let path = folder.0.as_path();
+    fn finish(self, path: &Path, jobs: usize, worst: usize) -> Result<Finished, Problems> {
+        let Self { outline, cases, modes, started, mut manifest, .. } = self;
         let mut contents = BTreeMap::new();
         contents.insert(TableName::Cases, close(path, TableName::Cases, cases)?);
         contents.insert(TableName::Modes, close(path, TableName::Modes, modes)?);
@@ -145,19 +169,26 @@ impl Results {
         manifest.finish()?;
         Ok(Finished { run, summary: rows, worst: worst_rows })
     }
-
-    fn problem(&self, name: TableName, error: &parquet::errors::ParquetError) -> Problems {
-        table::problem(&self.folder.0.join(name.file()), error)
-    }
 }
 
-/// The run's folder; removed with the folder of tables if nothing is in them.
-struct Folder(PathBuf);
+/// Folder of the tables inside a run's folder.
+const TABLES: &str = "tables";
+
+/// The run's folder; unless it is to be kept it goes with what a run writes into it, and stays
+/// only if somebody else has put something there.
+struct Folder {
+    path: PathBuf,
+    keep: bool,
+}
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        files::remove_if_empty(&self.0.join("tables"));
-        files::remove_if_empty(&self.0);
+        if self.keep {
+            return;
+        }
+        files::remove_folder(&self.path.join(TABLES));
+        files::remove_folder(&self.path.join(inputs::FOLDER));
+        files::remove_if_empty(&self.path);
     }
 }
 
@@ -367,7 +398,24 @@ mod tests {
         for case in 0..1500 {
             results.push(cases::record(&definition, 1, case)).unwrap();
         }
+        files::create_folder(&run.join(inputs::FOLDER).join("runs")).unwrap();
+        files::write(&run.join(inputs::FOLDER).join("runs/a.toml"), b"cases = 3000").unwrap();
         drop(results);
+        assert!(!run.exists());
+    }
+
+    #[test]
+    fn a_run_that_cannot_be_finished_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = folder.path().join("run");
+        let outline = cases::outline(&[1], StoredPoles::Named);
+        let definition = outline.definition.clone();
+        let mut results = Results::create(&run, outline).unwrap();
+        results.push(cases::record(&definition, 0, 0)).unwrap();
+        // A folder stands where the table of worst cases is to go, after others are finished.
+        fs::create_dir_all(run.join(TableName::Worst.file()).join("taken")).unwrap();
+        let problems = results.finish(1, 3).unwrap_err();
+        assert!(problems.to_string().contains("worst.parquet"), "{problems}");
         assert!(!run.exists());
     }
 

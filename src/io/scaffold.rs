@@ -35,10 +35,7 @@ const FILES: &[(&str, &[u8])] = embedded![
 /// # Errors
 /// One problem if `target` exists or cannot be written; then nothing is left behind.
 pub fn write(target: &Path) -> Result<Vec<&'static str>, Problems> {
-    if target.exists() {
-        let found = "something that exists";
-        return Err(Problems::input(files::name(target), "", found, "the name of a new folder"));
-    }
+    files::refuse_existing(target)?;
     let contents: Vec<(PathBuf, Vec<u8>)> =
         FILES.iter().map(|(path, bytes)| (path.into(), bytes.to_vec())).collect();
     folder::write(target, &contents, None)?;

@@ -2,6 +2,7 @@
 //!
 //! Types and ranges of single values live here; the rest is checked in `run`.
 
+use crate::campaign::definition::MOST_CASES;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -17,7 +18,7 @@ pub struct RunFile {
     /// Gates that `tvse gate` applies unless given others, relative to this file.
     pub gates: Option<String>,
     /// Number of dispersed cases.
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = MOST_CASES))]
     pub cases: u64,
     /// Seed of every draw.
     pub seed: u64,
@@ -119,6 +120,7 @@ pub struct CornerFile {
     pub name: String,
     /// Number of cases around it: keys without `worst` values are drawn.
     #[serde(default)]
+    #[schemars(range(max = MOST_CASES))]
     pub cases: u64,
     /// Who chooses between the low and the high `worst` value of each key.
     pub signs: SignsFile,
