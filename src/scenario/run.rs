@@ -82,7 +82,8 @@ pub fn resolve(
     for (i, corner) in file.corner.iter().enumerate() {
         let key = format!("corner[{i}]");
         names::word(f, &format!("{key}.name"), &corner.name);
-        if populations.iter().any(|p| p.name == corner.name || p.name == around(&corner.name)) {
+        let same = |a: &str, b: &str| a == b || a == around(b) || around(a) == b;
+        if populations.iter().any(|p| same(&p.name, &corner.name)) {
             let found = format!("\"{}\"", corner.name);
             f.push(format!("{key}.name"), found, "a name that no other population has");
         }

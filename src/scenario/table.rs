@@ -71,8 +71,9 @@ pub fn read<T: DeserializeOwned + JsonSchema>(
     text: &str,
 ) -> Result<(T, Findings), Problems> {
     let table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
-        let line = error.span().map_or(0, |span| text[..span.start].matches('\n').count() + 1);
-        Problems::input(file, format!("line {line}"), error.message(), "TOML 1.1")
+        let line = |at: usize| format!("line {}", text[..at].matches('\n').count() + 1);
+        let place = error.span().map_or(String::new(), |span| line(span.start));
+        Problems::input(file, place, error.message(), "TOML 1.1")
     })?;
     let schema = schemars::schema_for!(T).to_value();
     let findings =

@@ -137,6 +137,12 @@ impl<'a> Resolver<'a> {
                 good = false;
             }
         }
+        if let Some(i) = burned.windows(2).position(|w| good && w[0] > w[1]) {
+            let found = format!("{} after {}", burned[i + 1], burned[i]);
+            let key = format!("{key}.burned_fraction[{}]", i + 1);
+            self.findings.push(key, found, "numbers that never fall");
+            good = false;
+        }
         let users = || self.file.engine.iter().filter(|e| e.motor == file.name);
         if file.burned_fraction.is_none() && users().any(|e| e.nozzle.ablation.is_some()) {
             let allowed = "a table, since a nozzle on this motor ablates";

@@ -166,6 +166,20 @@ fn a_mode_without_a_label_at_a_flight_time_is_refused() {
     assert!(problems[0].found.contains("112 s"), "{problems:?}");
 }
 
+#[test]
+fn a_corner_shares_no_name_with_the_cases_around_another() {
+    for (first, second) in [("a", "a_dispersed"), ("a_dispersed", "a")] {
+        let corner = |name: &str| {
+            format!(
+                "[[corner]]\nname = \"{name}\"\nsigns = \"given\"\nlow = [\"booster.*.thrust\"]\n"
+            )
+        };
+        let text = format!("{REFERENCE}{}{}", corner(first), corner(second));
+        let problems = read(&text).expect_err("a problem").0;
+        assert!(problems.iter().any(|p| p.key == "corner[2].name"), "{problems:?}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
