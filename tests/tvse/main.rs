@@ -1,0 +1,15 @@
+//! `tvse` from outside: the built program and the public library on the shipped vehicle.
+//!
+//! What single modules promise is tested beside them; here only what shows when they work together.
+
+#![expect(clippy::disallowed_methods, reason = "the tests make, damage and read files")]
+
+mod answers;
+mod bad_input;
+mod commands;
+mod damage;
+mod failures;
+mod repeatability;
+mod schema;
+mod stopping;
+mod study;
