@@ -26,7 +26,8 @@ pub fn modal() -> Modal {
             points.push((format!("booster.{side}.case.{:02}", i + 1), [x, y, 0.0]));
         }
         points.push((format!("booster.{side}.aft.01"), [88.725, y, 0.0]));
-        points.push((format!("booster.{side}.aft.02"), [91.5, y, 0.0]));
+        points.push((format!("booster.{side}.aft.02"), [89.7, y, 0.0]));
+        points.push((format!("booster.{side}.aft.03"), [91.5, y, 0.0]));
     }
     for (i, (y, z)) in [(-2.0, 2.0), (2.0, 2.0), (-2.0, -2.0), (2.0, -2.0_f64)].iter().enumerate() {
         let y: &f64 = y;

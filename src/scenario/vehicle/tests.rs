@@ -41,7 +41,8 @@ fn the_reference_vehicle_is_read_as_it_stands() {
     // Moments of axial action lines at 45°: (0, r_z, −r_y).
     assert!((left.axes.column(0) - Vector3::new(0.0, s, s)).amax() < 1e-15);
     assert!((left.axes.column(1) - Vector3::new(0.0, -s, s)).amax() < 1e-15);
-    let stations = ["case.01", "case.02", "case.03", "case.04", "case.05", "aft.01", "gimbal"];
+    let stations =
+        ["case.01", "case.02", "case.03", "case.04", "case.05", "aft.01", "aft.02", "gimbal"];
     assert_eq!(left.case_stations, stations.map(|s| format!("booster.left.{s}")));
     assert_eq!(left.actuators[0].bearing, Bearing::Included);
     assert_eq!(left.actuators[1].law.reference_inertia_kg_m2, 24_000.0);
@@ -246,11 +247,11 @@ fn a_flight_time_needs_modes() {
 
 #[test]
 fn case_stations_follow_the_flow_as_far_as_the_throat() {
-    let stations = "[\"booster.left.case.*\", \"booster.left.aft.01\"]";
+    let stations = "[\"booster.left.case.*\", \"booster.left.aft.01\", \"booster.left.aft.02\"]";
     let (key, text) = problem(stations, "[\"booster.left.aft.01\", \"booster.left.case.*\"]");
     assert_eq!(key, "engine[0].case_stations");
     assert!(text.contains("order of the flow"), "{text}");
-    let (key, _) = problem(stations, "[\"booster.left.case.*\", \"booster.left.aft.02\"]");
+    let (key, _) = problem(stations, "[\"booster.left.case.*\", \"booster.left.aft.03\"]");
     assert_eq!(key, "engine[0].case_stations");
     let (key, _) = problem(stations, "[\"booster.left.cases.*\", \"booster.left.aft.01\"]");
     assert_eq!(key, "engine[0].case_stations[0]");
