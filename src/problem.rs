@@ -31,15 +31,17 @@ pub struct Problem {
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.key.is_empty() {
-            write!(f, "{}: found {}; allowed: {}", self.file, self.found, self.allowed)
-        } else {
-            write!(
-                f,
-                "{}: {}: found {}; allowed: {}",
-                self.file, self.key, self.found, self.allowed
-            )
+        let Self { file, key, found, allowed, .. } = self;
+        let key = if key.is_empty() { String::new() } else { format!("{key}: ") };
+        // What stands in a file must not steer the terminal on which it is shown.
+        for c in format!("{file}: {key}found {found}; allowed: {allowed}").chars() {
+            if c.is_control() && c != '\n' {
+                write!(f, "{}", c.escape_default())?;
+            } else {
+                write!(f, "{c}")?;
+            }
         }
+        Ok(())
     }
 }
 
@@ -104,5 +106,19 @@ impl Problems {
     /// The graver of the kinds present: damage before input.
     pub fn kind(&self) -> Kind {
         self.0.iter().map(|p| p.kind).max().unwrap_or(Kind::Input)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn control_characters_are_shown_and_not_obeyed() {
+        let problems = Problems::input("é.toml", "a\u{7}", "\"\u{1b}[31m\0\"", "b\nc");
+        let told = "é.toml: a\\u{7}: found \"\\u{1b}[31m\\u{0}\"; allowed: b\nc";
+        assert_eq!(problems.to_string(), told);
+        let whole = Problems::damage("f", "", "x", "y").to_string();
+        assert_eq!(whole, "f: found x; allowed: y");
     }
 }

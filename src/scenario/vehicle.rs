@@ -69,6 +69,11 @@ impl<'a> Resolver<'a> {
         if self.file.name.trim().is_empty() {
             self.findings.push("name", "an empty text", "a name");
         }
+        // It is shown on terminals, beside every result.
+        if self.file.name.contains(char::is_control) {
+            let found = format!("{:?}", self.file.name);
+            self.findings.push("name", found, "a name on one line, without control characters");
+        }
         self.flight_times(modal);
         let motors: Vec<Option<Arc<Motor>>> = self.motors();
         names::unique(self.findings, "motor", self.file.motor.iter().map(|m| m.name.as_str()));

@@ -169,6 +169,12 @@ fn wrong_entries_are_told_with_file_key_found_and_allowed() {
         ),
         (
             VEHICLE,
+            "name = \"SLS-like, synthetic\"",
+            "name = \"\\u001b[31mred\"",
+            "vehicle.toml: name: found \"\\u{1b}[31mred\"; allowed: a name on one line",
+        ),
+        (
+            VEHICLE,
             "name = \"right\"",
             "name = \"left\"",
             "vehicle.toml: engine[1].name: found \"booster.left\" again",
