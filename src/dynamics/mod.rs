@@ -1,4 +1,19 @@
 //! Dynamics: from one drawn vehicle to one linear model.
+//!
+//! Coordinates are the elastic coordinates η of the reduced body (engines removed, mass-normalised)
+//! and two gimbal rotations Θ per gimballed engine, relative to the thrust structure. Rotations are
+//! small rotation vectors: a point carried by a body that rotates by ρ about p moves by ρ × (x − p).
+//! `u` is the unit vector of the thrust force on the vehicle (nominally −x); generalised forces stand
+//! on the right-hand side, so that they enter stiffness and damping with a minus.
+//!
+//! Numbers in parentheses are the equations of the paper. Where its printed form and Lagrange's
+//! equations differ, the latter are implemented:
+//! - (2): the inertial coupling on its right-hand side multiplies β̈, as in the paper's own (3);
+//! - (6): `Γᵀ m Γ` and `Γᵀ m v̇`, with Γ = Φ_g − r_e× Ψ_g; the mass matrix is built as a congruence, so
+//!   that the terms printed with two equal levers never arise;
+//! - (4): only necessary (one coefficient of the quartic positive) and very loose: `planar` gives
+//!   the exact critical thrust beside it;
+//! - (13): the part of the exact nozzle term that is linear in the nozzle length; both are offered.
 
 pub mod assemble;
 pub mod drawn;
