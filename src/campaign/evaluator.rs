@@ -249,17 +249,10 @@ impl<'a> Evaluator<'a> {
             }
         }
         if self.all_poles {
-            let named: Vec<Complex<f64>> = rows.iter().map(|row| row.value).collect();
-            rows.extend(poles.iter().filter(|pole| !named.contains(pole)).map(|&value| Pole {
-                mode: None,
-                branch: Branch::Other,
-                label: None,
-                value,
-                identity_confidence: None,
-                participation_structure: None,
-                participation_nozzle: None,
-                residual: None,
-            }));
+            let named: Vec<Complex<f64>> = rows.iter().map(|row: &Pole| row.value).collect();
+            for &pole in poles.iter().filter(|pole| !named.contains(pole)) {
+                rows.push(other_pole(plant, &Reference::new(model, solver.pair(model, pole))));
+            }
         }
         Ok(rows)
     }
@@ -300,6 +293,24 @@ fn named_pole(
         participation_nozzle: Some(found.reference.participation(layout.gimbals())),
         residual: Some(pair.residual),
     })
+}
+
+/// The row of a pole that belongs to no named mode; it carries the label of the elastic mode with the
+/// largest participation, where that is more than half.
+fn other_pole(plant: &Plant, reference: &Reference) -> Pole {
+    let layout = &plant.layout;
+    let share = |coordinate: usize| reference.participation(coordinate..coordinate + 1);
+    let dominant = layout.elastic().max_by(|&a, &b| share(a).total_cmp(&share(b)));
+    Pole {
+        mode: None,
+        branch: Branch::Other,
+        label: dominant.filter(|&c| share(c) > 0.5).map(|c| layout.label(c).to_owned()),
+        value: reference.pair.pole,
+        identity_confidence: None,
+        participation_structure: Some(reference.participation(layout.elastic())),
+        participation_nozzle: Some(reference.participation(layout.gimbals())),
+        residual: Some(reference.pair.residual),
+    }
 }
 
 impl From<&eigen::Error> for Failure {

@@ -1,6 +1,7 @@
 //! `tvse check`: reads everything a run names and says what it found.
 
-use super::{Error, PASS};
+use super::{Error, PASS, gate};
+use crate::campaign::{DrawColumn, Outline, StoredPoles};
 use crate::io;
 use crate::report::scenario;
 use std::io::Write;
@@ -22,6 +23,11 @@ pub struct Args {
 /// All problems of the run file and of what it names.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let loaded = io::scenario::load(&args.run)?;
+    if let Some(gates) = &loaded.gates {
+        let draws = loaded.dispersion.draws().iter().map(DrawColumn::of).collect();
+        let definition = loaded.definition.clone();
+        gate::rules(gates, &Outline::new(definition, StoredPoles::Named, draws, Vec::new()))?;
+    }
     let corners: Vec<usize> =
         loaded.corners.iter().flat_map(|c| c.populations(&loaded.definition.populations)).collect();
     write!(

@@ -1,7 +1,7 @@
 //! `tvse gate`: holds a finished run against its gates.
 
 use super::Error;
-use crate::gate::{self, Report};
+use crate::gate::{self, Gate, Names, Report};
 use crate::io::{Run, files};
 use crate::report;
 use std::io::Write;
@@ -38,14 +38,24 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     judge(&run, &args.gates, &json, out)
 }
 
+/// The gates of a file, checked against what the run has, and the file's name.
+///
+/// # Errors
+/// All problems of the gate file.
+pub fn rules(path: &Path, run: &impl Names) -> Result<(Vec<Gate>, String), Error> {
+    let name = files::name(path);
+    let rules = gate::parse(&files::read_text(path)?, &name)?;
+    gate::check(&rules, run, &name)?;
+    Ok((rules, name))
+}
+
 /// Evaluates the gates of the file `gates` on `run`, prints them and writes `json`; gives the exit
 /// code.
 ///
 /// # Errors
 /// All problems of the gate file, damaged tables, or a file that cannot be written.
 pub fn judge(run: &Run, gates: &Path, json: &Path, out: &mut dyn Write) -> Result<u8, Error> {
-    let name = files::name(gates);
-    let rules = gate::parse(&files::read_text(gates)?, &name)?;
+    let (rules, name) = rules(gates, run)?;
     let report = Report::new(gate::evaluate(&rules, run, &name)?);
     files::write(json, report.to_json().as_bytes())?;
     writeln!(out, "{}{}", report::gates::gates(&report), json.display())?;

@@ -148,7 +148,7 @@ fn print(planar: &Planar, out: &mut dyn Write) -> Result<(), Error> {
     writeln!(out, "tail-wags-dog frequency        {dog}")?;
     let added =
         or(planar.first_order_added_damping(), "", "none: an undamped actuator in resonance");
-    writeln!(out, "damping ratio added, 1st order {}", added.trim_end())?;
+    writeln!(out, "damping ratio added, 1st order {}, without jet damping", added.trim_end())?;
     writeln!(
         out,
         "\n{:>20}{:>20}{:>20}{:>20}",

@@ -28,9 +28,13 @@ pub struct Args {
     /// Population of the case
     #[arg(long, value_name = "NAME", default_value = "dispersed")]
     population: String,
-    /// Folder of the replay (default: replay/POPULATION-N in the run's folder)
+    /// Folder of the replay (default: replay/POPULATION-N in the run's folder, where an older replay
+    /// is replaced)
     #[arg(long, short, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Replace an older replay in that folder
+    #[arg(long)]
+    force: bool,
 }
 
 /// Runs the command.
@@ -69,7 +73,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     });
     let name = format!("{}-{}", args.population, args.case);
     let target = args.output.clone().unwrap_or_else(|| args.run.join("replay").join(name));
-    let files = replay.write(&target)?;
+    let files = replay.write(&target, args.force || args.output.is_none())?;
 
     writeln!(out, "{}\n{}", vehicle.name, report::nominal::table(definition, &record))?;
     for failure in unsolved {

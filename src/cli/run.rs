@@ -69,9 +69,6 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let mut loaded = io::scenario::load(&args.run)?;
     let folder = args.output.clone().unwrap_or_else(|| args.run.with_extension(""));
     io::files::refuse_existing(&folder)?;
-    if let Some(gates) = &args.gates {
-        crate::gate::parse(&io::files::read_text(gates)?, &io::files::name(gates))?;
-    }
     let definition = &mut loaded.definition;
     if let Some(cases) = args.cases {
         definition.set_cases(cases);
@@ -92,6 +89,9 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     };
     let draws = loaded.dispersion.draws().iter().map(DrawColumn::of).collect();
     let outline = Outline::new(loaded.definition.clone(), poles, draws, inputs.digests());
+    if let Some(gates) = &args.gates {
+        gate::rules(gates, &outline)?;
+    }
     let mut results = Results::create(&folder, outline)?;
     inputs.write(&folder)?;
     let sampler = Sampler::new(&loaded.dispersion, loaded.definition.seed);

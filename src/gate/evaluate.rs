@@ -9,10 +9,18 @@
 use super::outcome::{Offender, Outcome};
 use super::resolve::{Claim, Plan, Run, column_unit, resolve};
 use super::rule::{Gate, Sense, Statistic};
-use super::source::{CaseValue, Metric, MissingMeans, Query, Source, Worst};
+use super::source::{CaseValue, Metric, MissingMeans, Names, Query, Source, Worst};
 use super::verdict::Verdict;
 use crate::problem::Problems;
 use crate::stats::{self, Probability, Sides, Tails};
+
+/// Checks gates read from `file` against what a run has, finished or planned.
+///
+/// # Errors
+/// As [`evaluate`].
+pub fn check(gates: &[Gate], names: &impl Names, file: &str) -> Result<(), Problems> {
+    resolve(gates, &Run::of(names), file).map(|_| ())
+}
 
 /// Evaluates gates read from `file`.
 ///

@@ -4,7 +4,6 @@
 //! The keys are described at [`RawGate`].
 
 mod evaluate;
-mod names;
 mod outcome;
 mod raw;
 mod resolve;
@@ -12,11 +11,11 @@ mod rule;
 mod source;
 mod verdict;
 
-pub use evaluate::evaluate;
+pub use evaluate::{check, evaluate};
 pub use outcome::{Offender, Outcome, Report, report_schema};
 pub use raw::{RawGate, RawGates, RawSeverity, RawStatistic, schema};
 pub use rule::{Gate, Limit, Quantity, Selection, Sense, Statistic, parse};
 pub use source::{
-    CaseValue, Metric, MissingMeans, Population, Query, Source, Table, Worst, reduce,
+    CaseValue, Metric, MissingMeans, Names, Population, Query, Source, Table, Worst, reduce,
 };
 pub use verdict::{Severity, Verdict, combine};

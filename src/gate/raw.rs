@@ -2,8 +2,8 @@
 //!
 //! What a combination of keys means, and whether it is allowed, is decided in `rule`.
 
-use crate::gate::names;
 use crate::problem::Problems;
+use crate::spelling::allowed_instead;
 use std::collections::BTreeMap;
 
 /// A gate file: a list of gates.
@@ -127,7 +127,7 @@ pub(super) fn read(text: &str, file: &str) -> (Vec<Entry>, Problems) {
             file,
             key,
             "an unknown key",
-            names::allowed(key, &["gate"]),
+            allowed_instead(key, ["gate"]),
         ));
     }
     let entries = match gates {
@@ -172,7 +172,7 @@ fn read_gate(gate: toml::Value, file: &str, path: &str, problems: &mut Problems)
         } else if !known.contains(&key) {
             let mut all = known.clone();
             all.extend(PREFIXES.map(|prefix| format!("{prefix}<unit>")));
-            let allowed = names::allowed(&key, &all);
+            let allowed = allowed_instead(&key, all.iter().map(|n| n.as_ref()));
             problems.extend(Problems::input(file, path, "an unknown key", allowed));
         } else {
             let alone = toml::Table::from_iter([(key.clone(), value.clone())]);

@@ -2,10 +2,10 @@
 //!
 //! Only names, units and the way the cases came about; values are looked at in `evaluate`.
 
-use super::names;
 use super::rule::{Gate, Quantity, Sense, Statistic};
-use super::source::{Metric, MissingMeans, Population, Source, Table};
+use super::source::{Metric, MissingMeans, Names, Population, Table};
 use crate::problem::Problems;
+use crate::spelling::allowed_instead;
 use crate::stats::{Confidence, Independent, Probability};
 
 /// What a run has.
@@ -18,7 +18,7 @@ pub(super) struct Run {
 }
 
 impl Run {
-    pub(super) fn of(source: &impl Source) -> Self {
+    pub(super) fn of(source: &impl Names) -> Self {
         Self {
             metrics: source.metrics(),
             populations: source.populations(),
@@ -76,7 +76,11 @@ impl Check<'_> {
         if let Some(name) = name
             && !names.contains(name)
         {
-            self.problem(key, format!("{name:?}"), names::allowed(name, names));
+            self.problem(
+                key,
+                format!("{name:?}"),
+                allowed_instead(name, names.iter().map(|n| n.as_ref())),
+            );
         }
     }
 
@@ -120,7 +124,7 @@ impl Check<'_> {
             self.problem(
                 "metric",
                 format!("{:?}", gate.metric),
-                names::allowed(&gate.metric, &names),
+                allowed_instead(&gate.metric, names.iter().map(|n| n.as_ref())),
             );
         }
         let claim = population.and_then(|population| self.claim(gate, population));

@@ -466,7 +466,7 @@ rationale = " "
             ]
         );
         let problems = parse(text, "gates.toml").unwrap_err();
-        assert!(problems.to_string().contains("did you mean metric?"));
+        assert!(problems.to_string().contains("did you mean `metric`?"));
     }
 
     #[test]

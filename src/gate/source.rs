@@ -84,8 +84,8 @@ pub struct CaseValue {
     pub value: Result<Option<f64>, String>,
 }
 
-/// A run as gates see it.
-pub trait Source {
+/// What a run has, finished or planned.
+pub trait Names {
     /// The columns that hold a number.
     fn metrics(&self) -> Vec<Metric>;
     /// The populations.
@@ -96,6 +96,10 @@ pub trait Source {
     fn flight_times_s(&self) -> Vec<f64>;
     /// The named modes.
     fn modes(&self) -> Vec<String>;
+}
+
+/// A finished run as gates see it.
+pub trait Source: Names {
     /// One value for each case that is present, in ascending order of case, by [`reduce`].
     fn values(&self, query: &Query<'_>) -> Result<Vec<CaseValue>, Problems>;
 }

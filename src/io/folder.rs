@@ -32,11 +32,37 @@ pub fn write(
         };
         return Err(Problems::input(name(target), "", found, allowed));
     }
+    // Nothing but what would be written again is ever removed.
+    if let Some(entry) = foreign_entry(target, files).filter(|_| exists) {
+        let found = format!("a folder that also holds `{entry}`");
+        let allowed = "a folder with files of its kind alone";
+        return Err(Problems::input(name(target), "", found, allowed));
+    }
     let parent = match target.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
     fill(parent, target, files, exists).map_err(|e| write_problem(target, &e))
+}
+
+/// A file below the folder `target` that is not among `files`.
+fn foreign_entry(target: &Path, files: &[(PathBuf, Vec<u8>)]) -> Option<String> {
+    let mut folders = vec![target.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).ok()?.flatten() {
+            let path = entry.path();
+            let inside = path.strip_prefix(target).ok()?.to_owned();
+            if files.iter().any(|(file, _)| *file == inside) {
+                continue;
+            }
+            if path.is_dir() && files.iter().any(|(file, _)| file.starts_with(&inside)) {
+                folders.push(path);
+                continue;
+            }
+            return Some(inside.display().to_string());
+        }
+    }
+    None
 }
 
 fn fill(
@@ -127,6 +153,20 @@ mod tests {
         assert!(write(&target, &files("three"), Some("other")).is_err());
         assert_eq!(fs::read(target.join("mark")).unwrap(), b"two");
         assert_eq!(names(place.path()), ["folder"]);
+    }
+
+    #[test]
+    fn a_folder_that_holds_anything_else_is_not_replaced() {
+        for foreign in ["notes.md", "tables/notes.md", "own/notes.md"] {
+            let place = tempfile::tempdir().unwrap();
+            let target = place.path().join("folder");
+            write(&target, &files("one"), None).unwrap();
+            fs::create_dir_all(target.join("own")).unwrap();
+            fs::write(target.join(foreign), "mine").unwrap();
+            assert!(write(&target, &files("two"), Some("mark")).is_err(), "{foreign}");
+            assert_eq!(fs::read(target.join(foreign)).unwrap(), b"mine");
+            assert_eq!(fs::read(target.join("mark")).unwrap(), b"one");
+        }
     }
 
     #[test]

@@ -132,11 +132,11 @@ impl Replay {
         Ok(())
     }
 
-    /// Writes the tables into the folder `target`, replacing an older replay there.
+    /// Writes the tables into the folder `target`; with `force` an older replay there is replaced.
     ///
     /// # Errors
     /// An input problem if it cannot be written.
-    pub fn write(&self, target: &Path) -> Result<Vec<PathBuf>, Problems> {
+    pub fn write(&self, target: &Path, force: bool) -> Result<Vec<PathBuf>, Problems> {
         let tables =
             [(&MATRICES, &self.matrices), (&POLES, &self.poles), (&VECTORS, &self.vectors)];
         let mut files = Vec::new();
@@ -147,7 +147,7 @@ impl Replay {
                 .map_err(|error| super::table::problem(&target.join(&name), &error))?;
             files.push((PathBuf::from(name), bytes));
         }
-        folder::write(target, &files, Some("matrices.parquet"))?;
+        folder::write(target, &files, force.then_some("matrices.parquet"))?;
         Ok(files.into_iter().map(|(name, _)| target.join(name)).collect())
     }
 }

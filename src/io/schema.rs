@@ -215,9 +215,12 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
                 BRANCHES.iter().position(|other| *other == branch)
             },
         ),
-        Column::text("label", "Modal label the pole carries, if any", |r: &ModeRow| {
-            r.outcome.as_ref().ok()?.label.as_deref()
-        }),
+        Column::text(
+            "label",
+            "Modal label the pole carries; for other poles that of the elastic mode with more than \
+             half of the participation, if any",
+            |r: &ModeRow| r.outcome.as_ref().ok()?.label.as_deref(),
+        ),
         number("pole_re_rad_s", "rad/s", "Real part of the pole; NULL if failed", |p| {
             Some(p.value.re)
         }),
@@ -239,19 +242,20 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
         number(
             "identity_confidence",
             "1",
-            "Modulus of the two-sided overlap with the nominal pole of the same name",
+            "Modulus of the two-sided overlap with the nominal pole of the same name, not bounded by \
+             1; where two poles exchange character the path decides, not this number",
             |p| p.identity_confidence,
         ),
         number(
             "participation_structure",
             "1",
-            "Sum of the participation factors of the elastic states",
+            "Real part of the sum of the participation factors of the elastic states; may leave 0 to 1",
             |p| p.participation_structure,
         ),
         number(
             "participation_nozzle",
             "1",
-            "Sum of the participation factors of the gimbal states",
+            "Real part of the sum of the participation factors of the gimbal states; may leave 0 to 1",
             |p| p.participation_nozzle,
         ),
         number("residual", "1", "Relative residual of the eigenpair", |p| p.residual),

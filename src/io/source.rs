@@ -5,8 +5,11 @@
 use super::column::{Column, Get};
 use super::run::Run;
 use super::schema;
+use crate::campaign::Outline;
 use crate::campaign::row::ModeRow;
-use crate::gate::{CaseValue, Metric, MissingMeans, Population, Query, Source, Table, reduce};
+use crate::gate::{
+    CaseValue, Metric, MissingMeans, Names, Population, Query, Source, Table, reduce,
+};
 use crate::problem::Problems;
 use crate::stats::Drawing;
 
@@ -15,10 +18,10 @@ const KEYS: [&str; 2] = ["case", "flight_time_s"];
 
 type Value = Result<Option<f64>, String>;
 
-impl Source for Run {
+impl Names for Outline {
     fn metrics(&self) -> Vec<Metric> {
-        let mut metrics = of_table(Table::Cases, &schema::cases(self.outline()));
-        metrics.extend(of_table(Table::Modes, &schema::modes(self.outline())));
+        let mut metrics = of_table(Table::Cases, &schema::cases(self));
+        metrics.extend(of_table(Table::Modes, &schema::modes(self)));
         metrics
     }
 
@@ -28,21 +31,45 @@ impl Source for Run {
             planned: p.cases,
             drawing: if p.drawn { Drawing::Independent } else { Drawing::Designed },
         };
-        self.outline().definition.populations.iter().map(population).collect()
+        self.definition.populations.iter().map(population).collect()
     }
 
     fn variants(&self) -> Vec<String> {
-        self.outline().definition.variants.iter().map(|v| v.name.clone()).collect()
+        self.definition.variants.iter().map(|v| v.name.clone()).collect()
     }
 
     fn flight_times_s(&self) -> Vec<f64> {
-        self.outline().definition.flight_times_s.clone()
+        self.definition.flight_times_s.clone()
     }
 
     fn modes(&self) -> Vec<String> {
-        self.outline().definition.modes.clone()
+        self.definition.modes.clone()
+    }
+}
+
+impl Names for Run {
+    fn metrics(&self) -> Vec<Metric> {
+        self.outline().metrics()
     }
 
+    fn populations(&self) -> Vec<Population> {
+        self.outline().populations()
+    }
+
+    fn variants(&self) -> Vec<String> {
+        self.outline().variants()
+    }
+
+    fn flight_times_s(&self) -> Vec<f64> {
+        self.outline().flight_times_s()
+    }
+
+    fn modes(&self) -> Vec<String> {
+        Names::modes(self.outline())
+    }
+}
+
+impl Source for Run {
     fn values(&self, query: &Query<'_>) -> Result<Vec<CaseValue>, Problems> {
         let populations = &self.outline().definition.populations;
         let population = populations
@@ -317,7 +344,7 @@ mod tests {
         let drawings: Vec<_> =
             run.populations().into_iter().map(|p| (p.planned, p.drawing)).collect();
         assert_eq!(drawings, [(1, Drawing::Designed), (CASES, Drawing::Independent)]);
-        assert_eq!(Source::modes(&run), ["tvse", "bending"]);
+        assert_eq!(Names::modes(&run), ["tvse", "bending"]);
         assert_eq!(run.variants(), ["no_jet", "jet"]);
         let names: Vec<_> = run.metrics().into_iter().map(|m| m.name).collect();
         assert!(!names.iter().any(|name| KEYS.contains(&name.as_str())));

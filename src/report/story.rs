@@ -34,6 +34,19 @@ pub fn story(outline: &Outline, summary: &[SummaryRow], worst: &[WorstRow]) -> S
             let failures = failures.map(|row| row.failures).max().unwrap_or(0);
             let failed = if failures > 0 { format!(", {failures} failed") } else { String::new() };
             line(&mut text, format_args!("{name}, {}: {} cases{failed}", p.name, p.cases));
+            if corner {
+                let beyond =
+                    |(draw, value): &&(usize, f64)| outline.draws[*draw].outside_law(*value);
+                let beyond = p.fixed.iter().filter(beyond).count();
+                line(
+                    &mut text,
+                    format_args!(
+                        "{} draws held at their worst values, {beyond} of them outside their law \
+                         (see the table `worst`)",
+                        p.fixed.len()
+                    ),
+                );
+            }
             line(&mut text, format_args!("{}\n", table(outline, summary, rows())));
             for (variant, v) in definition.variants.iter().enumerate() {
                 let of_variant = |row: &&WorstRow| {
@@ -71,7 +84,7 @@ fn table<'a>(
         "least ζ, %",
         "unstable, %",
         "95 % interval",
-        "time to double ≥, s",
+        "shortest time to double, s",
     ]);
     let mut last = None;
     for row in rows {
@@ -127,7 +140,7 @@ fn worst_case(outline: &Outline, rows: &[&WorstRow]) -> Option<String> {
         let draw = &outline.draws[row.draw?];
         let value = row.value?;
         Some(match row.score {
-            Some(score) => format!("{} {score:+.1} σ", draw.key),
+            Some(score) => format!("{} z {score:+.1}", draw.key),
             None if draw.outside_law(value) => {
                 format!("{} {value} {} (outside its law)", draw.key, draw.unit)
             }
@@ -136,7 +149,7 @@ fn worst_case(outline: &Outline, rows: &[&WorstRow]) -> Option<String> {
     });
     let draws: Vec<String> = draws.take(DRAWS).collect();
     if !draws.is_empty() {
-        write!(sentence, "; {}", draws.join(", ")).expect("a string takes any text");
+        write!(sentence, "; largest draws {}", draws.join(", ")).expect("a string takes any text");
     }
     Some(sentence)
 }
@@ -201,9 +214,9 @@ mod tests {
         };
         let worst = [row(1, 0.0025, None), row(0, 1.03, Some(2.96))];
         let text = story(&outline, &summary(&outline), &worst);
-        let expected = "worst case, no_jet: case 4 at 110 s, ζ -0.710 %, time to double 3.0 s; \
+        let expected = "worst case, no_jet: case 4 at 110 s, ζ -0.710 %, time to double 3.0 s; largest draws \
                         structure.damping @ mode 0.0025 1 (outside its law), \
-                        booster.left.thrust @ engine +3.0 σ\n";
+                        booster.left.thrust @ engine z +3.0\n";
         assert!(text.contains(expected), "{text}");
     }
 }

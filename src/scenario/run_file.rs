@@ -15,7 +15,8 @@ pub struct RunFile {
     pub vehicle: String,
     /// The dispersion table, relative to this file.
     pub dispersion: String,
-    /// Gates that `tvse gate` applies unless given others, relative to this file.
+    /// Gates for the run, relative to this file; `tvse check` holds them against the run definition.
+    /// They are applied where `--gates` names them.
     pub gates: Option<String>,
     /// Number of dispersed cases.
     #[schemars(range(min = 1, max = MOST_CASES))]

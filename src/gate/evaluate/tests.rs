@@ -26,7 +26,7 @@ impl Planted {
     }
 }
 
-impl Source for Planted {
+impl Names for Planted {
     fn metrics(&self) -> Vec<Metric> {
         [
             ("damping_ratio", "1", Table::Modes, MissingMeans::NoValue),
@@ -62,7 +62,9 @@ impl Source for Planted {
     fn modes(&self) -> Vec<String> {
         vec!["tvse".into()]
     }
+}
 
+impl Source for Planted {
     fn values(&self, query: &Query<'_>) -> Result<Vec<CaseValue>, Problems> {
         let take = if query.population == "nominal" { 1 } else { self.values.len() };
         let values = self.values.iter().take(take).cloned();
@@ -336,7 +338,7 @@ rationale = "r"
         ]
     );
     let metric = &problems.0[4];
-    assert!(metric.allowed.contains("(did you mean damping_ratio?)"), "{}", metric.allowed);
+    assert!(metric.allowed.contains("did you mean `damping_ratio`?"), "{}", metric.allowed);
     assert!(problems.0[7].allowed.starts_with("s, the unit of"));
 }
 
