@@ -13,7 +13,9 @@ use nalgebra::Complex;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
-/// Largest relative residual of an eigenpair, in units of n ε.
+/// Largest relative residual of an eigenpair, in units of n ε: elimination with partial pivoting is
+/// backward stable to n ε times the growth of its pivots, for which this leaves room. (The reference
+/// run stays below 1e-3: see the column `residual`.)
 const RESIDUAL_FACTOR: f64 = 1e3;
 
 /// Why an evaluator could not be prepared.

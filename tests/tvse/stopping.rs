@@ -58,7 +58,8 @@ fn a_full_disk_ends_a_run_with_the_name_of_the_file_and_leaves_nothing() {
     // Room for nothing, for the outputs as they are opened, and for the inputs but not the tables.
     for size in ["64k", "512k", "2m"] {
         let Some(small) = Small::mount(&place, size) else {
-            eprintln!("no full disk tested: this user may not mount");
+            assert!(std::env::var_os("CI").is_none(), "no full disk tested: mounting failed");
+            eprintln!("skipped: no full disk tested, this user may not mount");
             return;
         };
         let said = study.said(&["run", "runs/smoke.toml", "-o", "small/result", "--cases", "200"]);
