@@ -94,7 +94,7 @@ fn universal_files_old_and_new_are_the_same_model() {
         let found = results(name);
         assert_eq!(found.precision, Precision::Text { digits });
         assert_eq!(found.modes, model.modes, "{name}");
-        assert_eq!(found.units.is_some(), true, "{name}");
+        assert!(found.units.is_some(), "{name}");
         assert_eq!(found.complete(name), Ok(()));
         assert_eq!(found.warnings.len(), 1, "the displacement systems are told");
         // Here the systems are placed in the basic one: by rounding the same place and axes.
@@ -198,4 +198,31 @@ fn parts_that_contradict_each_other_are_told() {
     moved.nodes[1].position[2] = 2.1;
     let moved = found.merge(moved, "moved.bdf").unwrap_err().to_string();
     assert!(moved.starts_with("moved.bdf: node 2: found"), "{moved}");
+}
+
+#[test]
+fn a_file_that_calculix_wrote_has_the_modes_of_its_printed_output() {
+    // `ccx calculix` and the same with NODE OUTPUT; cycles as `calculix.dat` prints them.
+    let cycles =
+        [0.0, 0.0, 0.0, 6.178057e-06, 1.581917e-05, 2.274028e-05, 95.13967, 95.13967, 217.6212];
+    let (text, binary) = (results("calculix.frd"), results("calculix_binary.frd"));
+    for found in [&text, &binary] {
+        assert_eq!((found.modes.len(), found.nodes.len()), (9, 12));
+        for (mode, printed) in found.modes.iter().zip(cycles) {
+            // Seven printed digits here and there; six modes are rigid.
+            assert!((mode.frequency_hz - printed).abs() <= 1e-6 * printed, "{}", mode.frequency_hz);
+            assert_eq!(mode.generalised_mass, Some(1.0));
+            assert!(mode.shape.iter().all(|shape| shape.rotation.is_none()));
+        }
+    }
+    assert_eq!(text.nodes, binary.nodes);
+    for (a, b) in text.modes.iter().zip(&binary.modes) {
+        for (a, b) in a.shape.iter().zip(&b.shape) {
+            assert_eq!(a.node, b.node);
+            for (a, b) in a.translation.into_iter().zip(b.translation) {
+                // Six printed digits and single precision.
+                assert!((a - b).abs() <= (0.5e-5 + f64::from(f32::EPSILON)) * b.abs(), "{a} {b}");
+            }
+        }
+    }
 }

@@ -137,6 +137,22 @@ fn the_deck_of_the_free_free_model_has_the_grids_of_its_results() {
     assert_eq!(found.nodes.len(), 49);
 }
 
+/// The six numbers of every node one after another.
+fn vector(mode: &RawMode) -> Vec<f64> {
+    let numbers = |shape: &NodeShape| shape.translation.into_iter().chain(shape.rotation.unwrap());
+    mode.shape.iter().flat_map(numbers).collect()
+}
+
+/// Largest distance of `y` from the plane that `a` and `b` span, as a part of its largest number.
+fn off_the_plane(y: &[f64], a: &[f64], b: &[f64]) -> f64 {
+    let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+    let along = dot(a, b) / dot(a, a);
+    let c: Vec<f64> = b.iter().zip(a).map(|(b, a)| b - along * a).collect();
+    let (s, t) = (dot(y, a) / dot(a, a), dot(y, &c) / dot(&c, &c));
+    let off = (0..y.len()).map(|k| (y[k] - s * a[k] - t * c[k]).abs()).fold(0.0, f64::max);
+    off / y.iter().fold(0.0, |largest: f64, y| largest.max(y.abs()))
+}
+
 #[test]
 fn the_beam_is_the_same_in_both_op2_files_and_in_print() {
     let Some(first) = real_results("pynastran/beam_modes_m1.op2") else { return };
@@ -145,11 +161,59 @@ fn the_beam_is_the_same_in_both_op2_files_and_in_print() {
     as_pynastran_reads(&second, "beam_modes_m2");
     agrees_with_summary(&first, "beam_modes_m1");
     agrees_with_summary(&second, "beam_modes_m2");
+    assert_eq!(first.modes, second.modes);
     let text = String::from_utf8_lossy(&real("pynastran/beam_modes.f06").unwrap()).into_owned();
     let printed = printed(&text, false);
     assert_eq!(printed.len(), 10);
-    // The print has seven digits; values near zero are rounding of the solver.
-    close(&second.modes, &printed, 0.5e-6 + SINGLE, 1e-12);
+    // Seven printed digits, single precision, and rounding of the solver near zero.
+    close(&first.modes[4..6], &printed[4..6], 0.5e-6 + SINGLE, 1e-12);
+    // The other modes come in pairs of one frequency, of which the run printed other combinations.
+    for pair in [0, 2, 6, 8] {
+        let (a, b) = (vector(&first.modes[pair]), vector(&first.modes[pair + 1]));
+        for printed in &printed[pair..pair + 2] {
+            // Each of the three vectors is rounded, the pair enters with factors near one.
+            let off = off_the_plane(&vector(printed), &a, &b);
+            assert!(off <= 3.0 * (0.5e-6 + SINGLE), "mode {}: {off}", printed.number);
+        }
+    }
+    let cycles: Vec<f64> = text
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("CYCLES ="))
+        .map(first_number)
+        .collect();
+    assert_eq!(cycles.len(), 10);
+    for (mode, printed) in first.modes.iter().zip(cycles) {
+        assert!((mode.frequency_hz / printed - 1.0).abs() <= 0.5e-6 + SINGLE);
+    }
+}
+
+fn first_number(text: &str) -> f64 {
+    text.split_whitespace().next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn the_free_free_model_has_the_printed_eigenvalues() {
+    let Some(text) = real("pyyeti/full.out") else { return };
+    let found = real_results("pyyeti/full.op2").unwrap();
+    let text = String::from_utf8_lossy(&text).into_owned();
+    let mut compared = 0;
+    let mut table = false;
+    for line in text.lines() {
+        table =
+            (table || line.contains("R E A L   E I G E N V A L U E S")) && !line.starts_with('1');
+        let fields: Vec<&str> = line.split_whitespace().collect();
+        if !table || fields.len() != 7 || fields[0].parse::<usize>().is_err() {
+            continue;
+        }
+        let mode = &found.modes[fields[0].parse::<usize>().unwrap() - 1];
+        let (cycles, mass): (f64, f64) = (fields[4].parse().unwrap(), fields[5].parse().unwrap());
+        // Seven printed digits; the cycles are printed without the sign of the eigenvalue.
+        assert!((mode.frequency_hz.abs() / cycles - 1.0).abs() <= 0.5e-6 + SINGLE, "{line}");
+        assert_eq!(mode.frequency_hz < 0.0, fields[2].starts_with('-'), "{line}");
+        assert!((mode.generalised_mass.unwrap() / mass - 1.0).abs() <= 0.5e-6 + SINGLE);
+        compared += 1;
+    }
+    assert_eq!(compared, 278);
 }
 
 #[test]
@@ -158,10 +222,25 @@ fn hdf5_of_the_element_test_is_read_as_h5py_reads_it_and_has_the_grids_of_the_op
     let op2 = real_results("pynastran/modes_elements.op2").unwrap();
     as_pynastran_reads(&hdf5, "modes_elements_h5");
     as_pynastran_reads(&op2, "modes_elements_op2");
-    let numbers = |results: &Results| results.modes.iter().map(|m| m.number).collect::<Vec<_>>();
-    assert_eq!(numbers(&hdf5), [1, 2, 3]);
-    assert_eq!(numbers(&op2), [1, 2, 3]);
-    assert_eq!(hdf5.nodes.len(), op2.nodes.len());
+    // The later run has one grid more.
+    let without_new: Vec<_> = hdf5.nodes.iter().copied().filter(|node| node.id != 70).collect();
+    assert_eq!(without_new, op2.nodes);
+    assert_eq!(hdf5.systems, op2.systems);
+    // Three mechanisms at zero frequency, of which the two versions of the program found different
+    // ones: only grids 28, 29, 30, 32 and 33 move in either.
+    for results in [&hdf5, &op2] {
+        assert_eq!(results.modes.iter().map(|mode| mode.number).collect::<Vec<_>>(), [1, 2, 3]);
+        for mode in &results.modes {
+            assert!(mode.frequency_hz.abs() < 1e-6);
+            assert_eq!(mode.generalised_mass, Some(1.0));
+            for shape in &mode.shape {
+                let rotation = shape.rotation.unwrap();
+                let still = shape.translation.iter().chain(&rotation).all(|x| x.abs() < 1e-9);
+                assert_eq!(still, ![28, 29, 30, 32, 33].contains(&shape.node), "{shape:?}");
+            }
+        }
+        assert_eq!(results.complete("modes_elements"), Ok(()));
+    }
 }
 
 #[test]

@@ -160,6 +160,33 @@ class Op2:
     def key(self, key):
         self.block(self.ints(key))
 
+    def close(self):
+        self.key(0)
+        self.file.close()
+
+    def matrix(self, name, columns):
+        self.key(2)
+        self.block(self.text(f"{name:8}"))
+        self.key(-1)
+        self.key(7)
+        self.block(self.ints(101, len(columns), len(columns), 1, 1, 1, 1))
+        header = self.text(f"{name:8}")
+        self.start(-2, 0)
+        self.key(2)
+        self.block(header)
+        for k, column in enumerate(columns):
+            self.start(-3 - k, 1)
+            # The key counts the numbers; their row stands in front of them.
+            self.key(len(column))
+            self.block(self.ints(1) + self.reals(*column))
+        self.start(-3 - len(columns), 0)
+        self.key(0)
+
+    def start(self, number, kind):
+        self.key(number)
+        self.key(1)
+        self.key(kind)
+
     def table(self, name, records, pieces=1):
         self.key(2)
         self.block(self.text(f"{name:8}"))
@@ -168,9 +195,7 @@ class Op2:
         self.block(self.ints(101, 0, 0, 0, 0, 0, 0))
         number = -2
         for record in [self.text(f"{name:8}"), *records]:
-            self.key(number)
-            self.key(1)
-            self.key(0)
+            self.start(number, 0)
             words = len(record) // self.size
             step = max(1, -(-words // pieces))
             for k in range(0, words, step):
@@ -178,9 +203,7 @@ class Op2:
                 self.key(len(piece) // self.size)
                 self.block(piece)
             number -= 1
-        self.key(number)
-        self.key(1)
-        self.key(0)
+        self.start(number, 0)
         self.key(0)
 
     def ident(self, approach, table, subcase, mode, first, second, form, width, title, flag=0):
@@ -239,8 +262,9 @@ def op2():
             file = Op2(f"model_{order}_{8 * size}.op2", big, size, label=not big)
             file.geometry()
             file.summary()
-            file.table("KHH", [b"", file.reals(1.0, 2.0)])
+            file.matrix("KHH", [(1.0, 2.0), (3.0, 4.0)])
             file.shapes()
+            file.close()
     variants = {
         "basic": dict(name="BOUGV1"),
         "undamped": dict(imaginary=0.0),
@@ -254,6 +278,7 @@ def op2():
         file.geometry()
         file.summary(flag=2 if variant == "basic" else 0)
         file.shapes(**options)
+        file.close()
 
 
 # ---- HDF5
