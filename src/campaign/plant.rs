@@ -88,6 +88,7 @@ fn attachment(engine: &Engine, set: &ModeSet, slope: Slope) -> Result<Attachment
         slope,
         case_per_flow: case(engine, set, grid)?,
         in_modes: engine.in_modes,
+        actuators: 0,
     })
 }
 

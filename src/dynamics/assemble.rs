@@ -48,6 +48,8 @@ pub struct Attachment {
     pub case_per_flow: Vec<f64>,
     /// Whether the modes already contain the engine's mass (integrated body).
     pub in_modes: bool,
+    /// Number of its set of actuators, as in `Engine::sets`.
+    pub actuators: usize,
 }
 
 /// What no draw changes, at one flight time.
@@ -119,8 +121,9 @@ impl Plant {
                 let gravity = -engine.mass_kg * acceleration.dot(&cg);
                 for axis in 0..2 {
                     let at = (first + axis, first + axis);
-                    model.stiffness[at] += engine.gimbal_stiffness_n_m_rad[axis] + gravity;
-                    model.damping[at] += engine.gimbal_damping_n_m_s_rad[axis];
+                    let actuator = &engine.actuators[attachment.actuators][axis];
+                    model.stiffness[at] += actuator.stiffness_n_m_rad + gravity;
+                    model.damping[at] += actuator.damping_n_m_s_rad;
                 }
             }
         }
@@ -246,7 +249,7 @@ impl Motion {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::DrawnBody;
+    use crate::dynamics::{DrawnActuator, DrawnBody};
     use nalgebra::{DMatrix, Matrix3xX};
 
     /// Three modes and one canted engine, with no symmetry to hide a mistake.
@@ -277,6 +280,7 @@ mod tests {
                 slope,
                 case_per_flow: Vec::new(),
                 in_modes: false,
+                actuators: 0,
             }],
         };
         let drawn = DrawnVehicle {
@@ -292,11 +296,14 @@ mod tests {
                 inertia_kg_m2: 2.2e4,
                 axial_inertia_kg_m2: 1.5e4,
                 length_m: 4.0,
-                gimbal_stiffness_n_m_rad: [3.7e7, 3.9e7],
-                gimbal_damping_n_m_s_rad: [5.6e5, 5.1e5],
+                actuators: vec![[
+                    DrawnActuator::spring(3.7e7, 5.6e5),
+                    DrawnActuator::spring(3.9e7, 5.1e5),
+                ]],
                 shape_gain: vec![1.0, 1.1, 0.95],
                 slope_gain: vec![0.9, 1.0, 1.2],
             }],
+            ..DrawnVehicle::default()
         };
         (plant, drawn)
     }
@@ -400,7 +407,7 @@ mod tests {
         let mut expected = DMatrix::from_iterator(2, 2, gravity.iter().copied());
         for axis in 0..2 {
             assert!(expected[(axis, axis)] > 0.0, "an engine aft of its pivot is stiffened");
-            expected[(axis, axis)] += engine.gimbal_stiffness_n_m_rad[axis];
+            expected[(axis, axis)] += engine.actuators[0][axis].stiffness_n_m_rad;
         }
         assert_close(&block(&model.stiffness, 3..5, 3..5), &expected);
         assert_eq!(block(&model.stiffness, 3..5, 0..3), DMatrix::zeros(2, 3));
@@ -475,7 +482,7 @@ mod tests {
         close(model.damping[(0, 2)], row);
         close(model.damping[(0, 0)], 2.0 * 0.005 * 32.0 + row * psi);
         close(model.damping[(2, 0)], flow * length * length * psi);
-        close(model.damping[(2, 2)], engine.gimbal_damping_n_m_s_rad[1] + flow * length * length);
+        close(model.damping[(2, 2)], engine.actuators[0][1].damping_n_m_s_rad + flow * length * length);
     }
 
     #[test]
@@ -500,7 +507,7 @@ mod tests {
     fn without_thrust_damping_and_flow_every_pole_is_on_the_axis() {
         let (plant, mut drawn) = skewed();
         drawn.body.damping_ratio = vec![0.0; 3];
-        drawn.engines[0].gimbal_damping_n_m_s_rad = [0.0; 2];
+        drawn.engines[0].actuators[0].iter_mut().for_each(|a| a.damping_n_m_s_rad = 0.0);
         let model = assembled(&plant, &drawn, &NOTHING);
         let mut poles = Vec::new();
         crate::modal::Solver::new(5).poles(&model, &mut poles).expect("solved");

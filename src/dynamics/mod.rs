@@ -16,15 +16,22 @@
 //! - (13): the part of the exact nozzle term that is linear in the nozzle length; both are offered.
 
 pub mod assemble;
+pub mod control_law;
 pub mod drawn;
+pub mod interconnection;
 pub mod jet_damping;
 pub mod layout;
 pub mod load_response;
 pub mod model;
 pub mod planar;
+// pub mod servo;
 pub mod virtual_grid;
 
 pub use assemble::{Attachment, Effects, NozzleJet, Plant};
-pub use drawn::{DrawnBody, DrawnEngine, DrawnVehicle};
+pub use control_law::ControlLaw;
+pub use drawn::{
+    DrawnActuator, DrawnAutopilot, DrawnBody, DrawnEngine, DrawnPath, DrawnSensor, DrawnVehicle,
+};
 pub use layout::Layout;
 pub use model::Model;
+// pub use servo::{Feedback, Servo};

@@ -1,14 +1,26 @@
 //! The vehicle: validated values, with no randomness, no files and no equations.
 
 pub mod actuator;
+pub mod autopilot;
+pub mod delay;
 pub mod engine;
+pub mod filter;
 pub mod motor;
 pub mod package;
+pub mod state_space;
+pub mod transfer_function;
 
-pub use actuator::{Actuator, Bearing, SecondOrder};
+pub use actuator::{
+    Actuator, ActuatorSet, Bearing, Electrohydraulic, Law, SecondOrder, StateSpaceActuator,
+    TransferActuator,
+};
+pub use autopilot::{Allocation, Autopilot, Axis, Path, Sensor, SensorKind};
 pub use engine::{Ablation, Engine, Nozzle};
+pub use filter::{Filter, FilterDraw, FilterKind};
 pub use motor::Motor;
 pub use package::{Grid, MassProperties, Modal, Mode, ModeSet, Parent};
+pub use state_space::StateSpace;
+pub use transfer_function::TransferFunction;
 
 /// Standard gravity, m/s² (CGPM 1901), by which a specific impulse in seconds is defined.
 pub const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
@@ -26,8 +38,23 @@ pub struct Vehicle {
     pub named_modes: Vec<NamedMode>,
     /// Engines in file order.
     pub engines: Vec<Engine>,
+    /// Autopilot, if the vehicle has one.
+    pub autopilot: Option<Autopilot>,
     /// Modes per flight time.
     pub modal: Modal,
+}
+
+impl Vehicle {
+    /// Names of the alternative sets of actuators, in file order.
+    pub fn actuator_sets(&self) -> Vec<&str> {
+        let mut sets: Vec<&str> = Vec::new();
+        for set in self.engines.iter().flat_map(|engine| &engine.alternatives) {
+            if !sets.contains(&set.name.as_str()) {
+                sets.push(&set.name);
+            }
+        }
+        sets
+    }
 }
 
 /// A mode of interest by name.
