@@ -70,11 +70,7 @@ fn drawn(
         }
         .state_space(),
     };
-    Ok(DrawnActuator {
-        stiffness_n_m_rad: separate,
-        damping_n_m_s_rad: bearing_damping,
-        torque,
-    })
+    Ok(DrawnActuator { stiffness_n_m_rad: separate, damping_n_m_s_rad: bearing_damping, torque })
 }
 
 fn electrohydraulic(

@@ -90,7 +90,15 @@ fn with_modes(sets: Vec<ModeSet>, parents: Vec<Parent>) -> Vehicle {
             engine("booster", "right", Bearing::Included),
         ],
         autopilot: None,
-        modal: Modal { source: "test".into(), contains_engines: Vec::new(), sets, parents },
+        tanks: Vec::new(),
+        aerodynamics: None,
+        modal: Modal {
+            source: "test".into(),
+            contains_engines: Vec::new(),
+            contains_tanks: Vec::new(),
+            sets,
+            parents,
+        },
     }
 }
 

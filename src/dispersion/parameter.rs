@@ -47,6 +47,8 @@ pub enum Scope {
     Engine,
     /// Actuator of an engine.
     Actuator,
+    /// Tank.
+    Tank,
     /// Engine and modal label: the gimbal's part in a mode.
     Gimbal,
     /// Sensor of the autopilot.
@@ -71,6 +73,8 @@ pub enum Place {
     Engine(usize),
     /// Engine and actuator.
     Actuator(usize, usize),
+    /// A tank.
+    Tank(usize),
     /// Engine and modal label.
     Gimbal(usize, usize),
     /// A sensor.
@@ -164,6 +168,18 @@ registry! {
     FilterFrequency, Filter, "autopilot.path.<path>.filter.<filter>.frequency", "1", Positive, "factor on the frequencies of a filter of the autopilot, nominal 1";
     FilterDamping, Filter, "autopilot.path.<path>.filter.<filter>.damping", "1", NonNegative, "factor on the damping ratios of a filter of the autopilot, nominal 1";
     FilterDelay, Filter, "autopilot.path.<path>.filter.<filter>.delay", "s", Positive, "delay of a filter of the autopilot";
+    SloshMass, Tank, "tank.<tank>.slosh.mass", "kg", NonNegative, "slosh mass of a tank, table in flight time";
+    SloshFrequency, Tank, "tank.<tank>.slosh.frequency", "Hz", Positive, "slosh frequency of a tank under the nominal mean acceleration, table in flight time";
+    SloshDamping, Tank, "tank.<tank>.slosh.damping", "1", NonNegative, "slosh damping ratio of a tank";
+    RollInertia, Vehicle, "body.roll_inertia", "1", Positive, "gain on the inertia of the body about x, nominal 1";
+    PitchInertia, Vehicle, "body.pitch_inertia", "1", Positive, "gain on the inertia of the body about y, nominal 1";
+    YawInertia, Vehicle, "body.yaw_inertia", "1", Positive, "gain on the inertia of the body about z, nominal 1";
+    DynamicPressure, Vehicle, "aerodynamics.dynamic_pressure", "Pa", NonNegative, "dynamic pressure, table in flight time";
+    NormalForceSlope, Vehicle, "aerodynamics.normal_force_slope", "1/rad", Any, "slope of the normal force coefficient, table in flight time";
+    CenterOfPressure, Vehicle, "aerodynamics.center_of_pressure", "m", Any, "station of the centre of pressure, table in flight time";
+    AxialForce, Vehicle, "aerodynamics.axial_force", "1", NonNegative, "axial force coefficient, table in flight time";
+    PitchDamping, Vehicle, "aerodynamics.pitch_damping", "1", Any, "damping coefficient in pitch and yaw, table in flight time";
+    RollDamping, Vehicle, "aerodynamics.roll_damping", "1", Any, "damping coefficient in roll, table in flight time";
 }
 
 impl Quantity {
@@ -184,9 +200,16 @@ impl Quantity {
                     _ => true,
                 }
             }),
-            Place::Vehicle if self == Self::LoopDelay => {
-                vehicle.autopilot.as_ref().is_some_and(|autopilot| autopilot.delay_s > 0.0)
-            }
+            Place::Vehicle => match self {
+                Self::LoopDelay => vehicle.autopilot.as_ref().is_some_and(|a| a.delay_s > 0.0),
+                Self::DynamicPressure
+                | Self::NormalForceSlope
+                | Self::CenterOfPressure
+                | Self::AxialForce
+                | Self::PitchDamping
+                | Self::RollDamping => vehicle.aerodynamics.is_some(),
+                _ => true,
+            },
             _ => true,
         }
     }
@@ -268,6 +291,7 @@ pub struct Parameters {
     sensors: usize,
     /// Number of the first filter of each path, and of all.
     filters: Vec<usize>,
+    tanks: usize,
     labels: Vec<Label>,
     /// Number of the first parameter of each quantity.
     first: Vec<usize>,
@@ -316,6 +340,7 @@ impl Parameters {
             actuators: starts(vehicle.engines.iter().map(|engine| 2 * engine.sets().count())),
             sensors: autopilot.map_or(0, |autopilot| autopilot.sensors.len()),
             filters: starts(paths.iter().map(|path| path.filters.len())),
+            tanks: vehicle.tanks.len(),
             labels,
             first: Vec::new(),
             all: Vec::new(),
@@ -340,6 +365,7 @@ impl Parameters {
             Scope::Actuator => {
                 members(&self.actuators).map(|(e, a)| Place::Actuator(e, a)).collect()
             }
+            Scope::Tank => (0..self.tanks).map(Place::Tank).collect(),
             Scope::Gimbal => engines
                 .flat_map(|e| (0..self.labels.len()).map(move |l| Place::Gimbal(e, l)))
                 .collect(),
@@ -367,6 +393,7 @@ impl Parameters {
                 let name = &vehicle.engines[e].actuator(a).name;
                 engine(path, e).replace("<actuator>", name)
             }
+            Place::Tank(t) => path.replace("<tank>", &vehicle.tanks[t].name),
             Place::Gimbal(e, l) => engine(path, e).replace("<label>", &self.labels[l].name),
             Place::Sensor(s) => path.replace("<sensor>", &autopilot().sensors[s].name),
             Place::SensorMode(s, l) => path
@@ -387,6 +414,7 @@ impl Parameters {
             Place::Mode(l) => (Scope::Mode, l),
             Place::Engine(e) => (Scope::Engine, e),
             Place::Actuator(e, a) => (Scope::Actuator, self.actuators[e] + a),
+            Place::Tank(t) => (Scope::Tank, t),
             Place::Gimbal(e, l) => (Scope::Gimbal, e * self.labels.len() + l),
             Place::Sensor(s) => (Scope::Sensor, s),
             Place::SensorMode(s, l) => (Scope::SensorMode, s * self.labels.len() + l),
@@ -434,6 +462,7 @@ impl Place {
             Self::Vehicle
             | Self::Engine(_)
             | Self::Actuator(..)
+            | Self::Tank(_)
             | Self::Sensor(_)
             | Self::Path(_)
             | Self::Filter(..) => None,
@@ -489,6 +518,7 @@ mod tests {
                 Scope::Mode => &["<label>"],
                 Scope::Engine => &["<group>", "<engine>"],
                 Scope::Actuator => &["<group>", "<engine>", "<actuator>"],
+                Scope::Tank => &["<tank>"],
                 Scope::Gimbal => &["<group>", "<engine>", "<label>"],
                 Scope::Sensor => &["<sensor>"],
                 Scope::SensorMode => &["<sensor>", "<label>"],

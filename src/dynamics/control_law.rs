@@ -60,7 +60,8 @@ impl ControlLaw {
         let mut right = self.sensed.clone();
         for (i, (path, draw)) in autopilot.paths.iter().zip(&drawn.paths).enumerate() {
             let filters = path.filters.iter().zip(&draw.filters);
-            let value: Complex<f64> = filters.map(|(filter, draw)| filter.kind.response(draw, s)).product();
+            let value: Complex<f64> =
+                filters.map(|(filter, draw)| filter.kind.response(draw, s)).product();
             let value = value * draw.gain;
             if !(value.re.is_finite() && value.im.is_finite()) {
                 return None;

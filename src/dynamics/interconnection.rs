@@ -140,30 +140,8 @@ impl Interconnection {
     /// # Panics
     /// If the blocks do not have the sizes of their names.
     pub fn compose(&self, blocks: &[StateSpace]) -> Result<StateSpace, AlgebraicLoop> {
-        assert_eq!(blocks.len(), self.ranges.len(), "a system for each block");
         let (states, externals) = (self.states.len(), self.inputs.len());
-        // Columns: states, then external inputs.
-        let columns = states + externals;
-        let mut y = DMatrix::zeros(self.ports.len(), columns);
-        let mut through = DMatrix::zeros(self.ports.len(), self.ports.len());
-        for (block, [xs, us, ys]) in blocks.iter().zip(&self.ranges) {
-            assert_eq!([block.order(), block.inputs(), block.outputs()], [xs, us, ys].map(|r| r.len()));
-            y.view_mut((ys.start, xs.start), (ys.len(), xs.len())).copy_from(&block.c);
-            for (input, tap) in self.reads[us.clone()].iter().enumerate() {
-                for (output, row) in ys.clone().enumerate() {
-                    let gain = block.d[(output, input)];
-                    if gain == 0.0 {
-                        continue;
-                    }
-                    if let Some(external) = tap.external {
-                        y[(row, states + external)] += gain;
-                    }
-                    for &source in &tap.outputs {
-                        through[(row, source)] += gain;
-                    }
-                }
-            }
-        }
+        let (through, mut y) = self.direct(blocks);
         self.solve(&through, &mut y)?;
 
         let mut a = DMatrix::zeros(states, states);
@@ -208,6 +186,53 @@ impl Interconnection {
         Ok(StateSpace { a, b, c, d })
     }
 
+    /// Output ports of `blocks` that depend on themselves without a state between, as `block: signal`.
+    ///
+    /// # Panics
+    /// If the blocks do not have the sizes of their names.
+    pub fn find_loop(&self, blocks: &[StateSpace]) -> Option<Vec<String>> {
+        let (through, _) = self.direct(blocks);
+        let mut open: Vec<usize> = (0..self.ports.len()).collect();
+        loop {
+            let waits = |row: &usize| open.iter().any(|&o| through[(*row, o)] != 0.0);
+            let left: Vec<usize> = open.iter().copied().filter(waits).collect();
+            if left.len() == open.len() {
+                break;
+            }
+            open = left;
+        }
+        let core = core(&through, open);
+        (!core.is_empty()).then(|| core.iter().map(|&port| self.ports[port].clone()).collect())
+    }
+
+    /// D K between the outputs of the blocks, and `[C, D E]` for states and external inputs.
+    fn direct(&self, blocks: &[StateSpace]) -> (DMatrix<f64>, DMatrix<f64>) {
+        assert_eq!(blocks.len(), self.ranges.len(), "a system for each block");
+        let states = self.states.len();
+        let mut y = DMatrix::zeros(self.ports.len(), states + self.inputs.len());
+        let mut through = DMatrix::zeros(self.ports.len(), self.ports.len());
+        for (block, [xs, us, ys]) in blocks.iter().zip(&self.ranges) {
+            let sizes = [xs.len(), us.len(), ys.len()];
+            assert_eq!([block.order(), block.inputs(), block.outputs()], sizes);
+            y.view_mut((ys.start, xs.start), (ys.len(), xs.len())).copy_from(&block.c);
+            for (input, tap) in self.reads[us.clone()].iter().enumerate() {
+                for (output, row) in ys.clone().enumerate() {
+                    let gain = block.d[(output, input)];
+                    if gain == 0.0 {
+                        continue;
+                    }
+                    if let Some(external) = tap.external {
+                        y[(row, states + external)] += gain;
+                    }
+                    for &source in &tap.outputs {
+                        through[(row, source)] += gain;
+                    }
+                }
+            }
+        }
+        (through, y)
+    }
+
     /// Solves `(1 − through) y = y` in place.
     fn solve(&self, through: &DMatrix<f64>, y: &mut DMatrix<f64>) -> Result<(), AlgebraicLoop> {
         let mut open: Vec<usize> = (0..through.nrows()).collect();
@@ -216,16 +241,7 @@ impl Interconnection {
             let ready: Vec<usize> =
                 open.iter().copied().filter(|&row| !needs(row, &open)).collect();
             let next = if ready.is_empty() {
-                // Every open output waits for another: those that others wait for are the loops.
-                let mut core = open.clone();
-                loop {
-                    let feeds = |o: usize| core.iter().any(|&row| through[(row, o)] != 0.0);
-                    let kept: Vec<usize> = core.iter().copied().filter(|&o| feeds(o)).collect();
-                    if kept.len() == core.len() {
-                        break;
-                    }
-                    core = kept;
-                }
+                let core = core(through, open.clone());
                 self.solve_loop(through, &core, y)?;
                 core
             } else {
@@ -283,6 +299,18 @@ impl Interconnection {
             }
         }
         Ok(())
+    }
+}
+
+/// Of outputs that all wait for another one of them, those in the loops and between.
+fn core(through: &DMatrix<f64>, mut waiting: Vec<usize>) -> Vec<usize> {
+    loop {
+        let feeds = |o: &usize| waiting.iter().any(|&row| through[(row, *o)] != 0.0);
+        let kept: Vec<usize> = waiting.iter().copied().filter(feeds).collect();
+        if kept.len() == waiting.len() {
+            return kept;
+        }
+        waiting = kept;
     }
 }
 

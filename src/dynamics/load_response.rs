@@ -21,7 +21,11 @@ impl NozzleOnActuator {
         let separate = actuator.bearing == Bearing::Separate;
         Self {
             inertia_kg_m2,
-            bearing_stiffness_n_m_rad: if separate { engine.bearing_stiffness_n_m_rad } else { 0.0 },
+            bearing_stiffness_n_m_rad: if separate {
+                engine.bearing_stiffness_n_m_rad
+            } else {
+                0.0
+            },
             bearing_damping_n_m_s_rad: engine.bearing_damping_n_m_s_rad,
             torque: actuator.law.state_space(),
         }

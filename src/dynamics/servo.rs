@@ -4,9 +4,11 @@
 //! The blocks are prepared once for a vehicle and a way of closing the loop; composing a drawn vehicle
 //! works on numbers alone. Mechanics is added up in `assemble`.
 
-use super::interconnection::{AlgebraicLoop, Block, Interconnection, Unknown};
-use super::{DrawnVehicle, Layout, Model};
-use crate::vehicle::{Autopilot, Axis, Path, SensorKind, StateSpace, Vehicle, delay};
+use super::interconnection::{Block, Interconnection, Unknown};
+use super::{ControlLaw, DrawnVehicle, Layout, Model};
+use crate::vehicle::{
+    Autopilot, Axis, FilterDraw, Law, ModeSet, Path, SensorKind, StateSpace, Vehicle, delay,
+};
 use nalgebra::{DMatrix, Vector3};
 
 /// What the autopilot does.
@@ -34,9 +36,22 @@ pub enum Error {
     /// No engine has actuators of this set.
     #[error("no engine has actuators of the set `{0}`")]
     NoSet(String),
+    /// A sensor's grid is not in the modal package at this time.
+    #[error("autopilot sensor {sensor}: grid `{grid}` is not in the modal package at {time_s} s")]
+    MissingGrid {
+        /// Name of the sensor.
+        sensor: String,
+        /// Name of the grid.
+        grid: String,
+        /// Flight time, s.
+        time_s: f64,
+    },
     /// A signal that nothing makes.
     #[error("{0}")]
     Unknown(#[from] Unknown),
+    /// Paths that pass on at once what they themselves make.
+    #[error("an algebraic loop through {}", .0.join(", "))]
+    AlgebraicLoop(Vec<String>),
 }
 
 /// What a block is made of.
@@ -72,10 +87,12 @@ pub struct Servo {
     signals: Vec<Signal>,
     /// Engine and axis of each torque, the first outputs of the whole.
     torques: Vec<(usize, usize)>,
+    /// The autopilot and its law, whether or not it acts.
+    autopilot: Option<(Autopilot, ControlLaw)>,
+    /// Nominal slopes of the modes at the grid of each sensor: sensors, then modes, rad/m per kg^1/2.
+    slopes: Vec<Vec<Vector3<f64>>>,
+    active: bool,
 }
-
-/// Slopes of the modes at the grids of an autopilot's sensors: sensors, then modes, rad/m per kg^1/2.
-pub type SensorSlopes = Vec<Vec<Vector3<f64>>>;
 
 /// A linear combination of coordinates, or of their rates.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,8 +114,8 @@ fn axes(prefix: &str) -> Vec<String> {
 }
 
 impl Servo {
-    /// The servo part of `vehicle` with these engines gimballed, this feedback, and the actuators of a
-    /// set (engines without it keep their own).
+    /// The servo part of `vehicle` with the modes of `modes`, these engines gimballed, this feedback, and
+    /// the actuators of a set (engines without it keep their own).
     ///
     /// External inputs are the axis commands, where there is an autopilot, and the gimbal commands.
     /// Outputs are the torques, and with feedback also `feedback.<axis>`.
@@ -107,6 +124,7 @@ impl Servo {
     /// See [`Error`].
     pub fn new(
         vehicle: &Vehicle,
+        modes: &ModeSet,
         gimballed: &[bool],
         feedback: Feedback,
         set: Option<&str>,
@@ -145,7 +163,42 @@ impl Servo {
         let gives = torques.iter().map(|&(e, axis)| format!("torque.{}", gimbal(e, axis)));
         outputs.splice(0..0, gives);
         let connection = Interconnection::new(&blocks, inputs, outputs)?;
-        Ok(Self { connection, sources, signals, torques })
+        let springs = sources.iter().all(|source| match source {
+            Source::Actuator(engine, set, axis) => {
+                let actuator = vehicle.engines[*engine].actuator(2 * set + axis);
+                matches!(actuator.law, Law::SecondOrder(_))
+            }
+            _ => true,
+        });
+        let autopilot = vehicle.autopilot.as_ref();
+        let servo = Self {
+            connection,
+            sources,
+            signals,
+            torques,
+            slopes: slopes(autopilot, modes)?,
+            autopilot: autopilot.map(|a| (a.clone(), ControlLaw::new(a))),
+            active: !springs || feedback != Feedback::Open,
+        };
+        // A draw changes numbers, not which of them are zero: what has no loop now never has one.
+        let nominal: Vec<StateSpace> =
+            servo.sources.iter().map(|source| servo.nominal(source, vehicle)).collect();
+        servo
+            .connection
+            .find_loop(&nominal)
+            .map_or(Ok(()), |ports| Err(Error::AlgebraicLoop(ports)))?;
+        Ok(servo)
+    }
+
+    /// Whether it adds anything to a model: springs between command and nozzle stand in the model
+    /// without it.
+    pub fn is_active(&self) -> bool {
+        self.active
+    }
+
+    /// The autopilot and its law in the frequency domain, if the vehicle has one.
+    pub fn autopilot(&self) -> Option<(&Autopilot, &ControlLaw)> {
+        self.autopilot.as_ref().map(|(autopilot, law)| (autopilot, law))
     }
 
     /// Names of the first-order states, for the layout.
@@ -159,43 +212,60 @@ impl Servo {
     }
 
     /// The whole of a drawn vehicle: from mechanical signals and external inputs to torques, N·m.
-    ///
-    /// # Errors
-    /// See [`AlgebraicLoop`].
-    pub fn compose(
-        &self,
-        vehicle: &Vehicle,
-        drawn: &DrawnVehicle,
-    ) -> Result<StateSpace, AlgebraicLoop> {
-        let autopilot = vehicle.autopilot.as_ref();
+    pub fn compose(&self, drawn: &DrawnVehicle) -> StateSpace {
         let block = |source: &Source| match source {
             Source::Actuator(engine, set, axis) => {
                 drawn.engines[*engine].actuators[*set][*axis].torque.clone()
             }
             Source::Fixed(system) => system.clone(),
             Source::Path(path, weights) => {
-                let nominal = &autopilot.expect("paths are those of an autopilot").paths[*path];
-                path_system(nominal, &drawn.autopilot.paths[*path], weights)
+                let draw = &drawn.autopilot.paths[*path];
+                let filters = draw.filters.iter();
+                path_system(&self.paths()[*path], draw.gain, filters, weights)
             }
-            Source::Axis(paths) => {
-                let order = autopilot.map_or(1, |autopilot| autopilot.delay_order);
-                delay::pade(drawn.autopilot.delay_s, order)
-                    .after(&DMatrix::from_element(1, *paths, 1.0))
-            }
+            Source::Axis(paths) => self.axis(drawn.autopilot.delay_s, *paths),
         };
         let blocks: Vec<StateSpace> = self.sources.iter().map(block).collect();
-        self.connection.compose(&blocks)
+        self.connection.compose(&blocks).expect("algebraic loops are refused when it is prepared")
+    }
+
+    /// A block as the vehicle has it nominally, with a gain of one on paths.
+    fn nominal(&self, source: &Source, vehicle: &Vehicle) -> StateSpace {
+        match source {
+            Source::Actuator(engine, set, axis) => {
+                vehicle.engines[*engine].actuator(2 * set + axis).law.state_space()
+            }
+            Source::Fixed(system) => system.clone(),
+            Source::Path(path, weights) => {
+                let path = &self.paths()[*path];
+                let draws: Vec<_> = path.filters.iter().map(|f| f.kind.nominal()).collect();
+                path_system(path, 1.0, draws.iter(), weights)
+            }
+            Source::Axis(paths) => {
+                self.axis(self.autopilot.as_ref().map_or(0.0, |(a, _)| a.delay_s), *paths)
+            }
+        }
+    }
+
+    fn paths(&self) -> &[Path] {
+        self.autopilot.as_ref().map_or(&[], |(autopilot, _)| &autopilot.paths)
+    }
+
+    /// The sum of as many paths, delayed.
+    fn axis(&self, delay_s: f64, paths: usize) -> StateSpace {
+        let order = self.autopilot.as_ref().map_or(1, |(autopilot, _)| autopilot.delay_order);
+        delay::pade(delay_s, order).after(&DMatrix::from_element(1, paths, 1.0))
     }
 
     /// Writes `composite` (see [`Servo::compose`]) into the model: with mechanical signals
     /// y = S_q q + S_v q̇ and torques on the gimbal rotations by H, `K −= Hᵀ D S_q`, `D −= Hᵀ D S_v`,
-    /// `K_qa −= Hᵀ C`, `K_aq −= B S_q`, `D_aq −= B S_v`, `K_aa −= A`.
+    /// `K_qa −= Hᵀ C`, `K_aq −= B S_q`, `D_aq −= B S_v`, `K_aa −= A`. The sensors are multiplied by
+    /// `feedback` (1 in flight), so that with 0 nothing senses the rigid body.
     pub fn attach(
         &self,
         composite: &StateSpace,
-        slopes: &SensorSlopes,
-        vehicle: &Vehicle,
         drawn: &DrawnVehicle,
+        feedback: f64,
         layout: &Layout,
         model: &mut Model,
     ) {
@@ -203,9 +273,11 @@ impl Servo {
         let states = composite.order();
         let rows: Vec<Option<usize>> = self.torques.iter().map(|&t| gimbal(layout, t)).collect();
         for (column, &signal) in self.signals.iter().enumerate() {
-            let row = self.row(signal, slopes, vehicle, drawn, layout);
+            let row = self.row(signal, drawn, layout);
+            let share = if matches!(signal, Signal::Sensor(..)) { feedback } else { 1.0 };
             let matrix = if row.rate { &mut model.damping } else { &mut model.stiffness };
             for &(coordinate, factor) in &row.entries {
+                let factor = share * factor;
                 for (torque, at) in rows.iter().enumerate() {
                     let gain = composite.d[(torque, column)];
                     if let Some(at) = at.filter(|_| gain != 0.0) {
@@ -247,14 +319,29 @@ impl Servo {
         matrix
     }
 
-    fn row(
+    /// What a sensor of the autopilot measures about an axis: `scale · (Ψ η + θ)` or its rate, rad or
+    /// rad/s; θ only where the rigid body is free.
+    ///
+    /// # Panics
+    /// If the vehicle has no such sensor.
+    pub fn sensor_row(
         &self,
-        signal: Signal,
-        slopes: &SensorSlopes,
-        vehicle: &Vehicle,
+        sensor: usize,
+        axis: Axis,
         drawn: &DrawnVehicle,
         layout: &Layout,
     ) -> Row {
+        let (autopilot, _) = self.autopilot.as_ref().expect("sensors are those of an autopilot");
+        let draw = &drawn.autopilot.sensors[sensor];
+        let elastic = layout.elastic().zip(self.slopes[sensor].iter().zip(&draw.slope_gain));
+        let mut entries: Vec<(usize, f64)> = elastic
+            .map(|(at, (slope, gain))| (at, draw.scale * gain * slope[axis as usize]))
+            .collect();
+        entries.extend(layout.rotation().nth(axis as usize).map(|at| (at, draw.scale)));
+        Row { entries, rate: autopilot.sensors[sensor].kind == SensorKind::RateGyro }
+    }
+
+    fn row(&self, signal: Signal, drawn: &DrawnVehicle, layout: &Layout) -> Row {
         let of = |engine, axis, rate| {
             let coordinate = gimbal(layout, (engine, axis));
             Row { entries: coordinate.map(|c| (c, 1.0)).into_iter().collect(), rate }
@@ -262,34 +349,23 @@ impl Servo {
         match signal {
             Signal::Gimbal(engine, axis) => of(engine, axis, false),
             Signal::GimbalRate(engine, axis) => of(engine, axis, true),
-            Signal::Sensor(sensor, axis) => {
-                sensor_row(sensor, axis, slopes, vehicle, drawn, layout)
-            }
+            Signal::Sensor(sensor, axis) => self.sensor_row(sensor, axis, drawn, layout),
         }
     }
 }
 
-/// What a sensor of the autopilot measures about an axis: `scale · (Ψ η + θ)` or its rate, rad or
-/// rad/s; θ only where the rigid body is free.
-///
-/// # Panics
-/// If the vehicle has no such sensor.
-pub fn sensor_row(
-    sensor: usize,
-    axis: Axis,
-    slopes: &SensorSlopes,
-    vehicle: &Vehicle,
-    drawn: &DrawnVehicle,
-    layout: &Layout,
-) -> Row {
-    let autopilot = vehicle.autopilot.as_ref().expect("sensors are those of an autopilot");
-    let draw = &drawn.autopilot.sensors[sensor];
-    let elastic = layout.elastic().zip(slopes[sensor].iter().zip(&draw.slope_gain));
-    let mut entries: Vec<(usize, f64)> = elastic
-        .map(|(coordinate, (slope, gain))| (coordinate, draw.scale * gain * slope[axis as usize]))
-        .collect();
-    entries.extend(layout.rotation().nth(axis as usize).map(|c| (c, draw.scale)));
-    Row { entries, rate: autopilot.sensors[sensor].kind == SensorKind::RateGyro }
+/// Slopes of the modes at the grids of the sensors.
+fn slopes(autopilot: Option<&Autopilot>, modes: &ModeSet) -> Result<Vec<Vec<Vector3<f64>>>, Error> {
+    let sensors = autopilot.map_or(&[][..], |autopilot| &autopilot.sensors);
+    let of = |sensor: &crate::vehicle::Sensor| {
+        let grid = modes.grid(&sensor.grid).ok_or_else(|| Error::MissingGrid {
+            sensor: sensor.name.clone(),
+            grid: sensor.grid.clone(),
+            time_s: modes.flight_time_s,
+        })?;
+        Ok(modes.modes.iter().map(|mode| mode.slope[grid]).collect())
+    };
+    sensors.iter().map(of).collect()
 }
 
 /// Coordinate of a gimbal rotation.
@@ -298,10 +374,16 @@ fn gimbal(layout: &Layout, (engine, axis): (usize, usize)) -> Option<usize> {
 }
 
 /// Weighted inputs, gain and filters in series.
-fn path_system(path: &Path, drawn: &super::DrawnPath, weights: &DMatrix<f64>) -> StateSpace {
-    let start = StateSpace::gain(weights * drawn.gain);
-    let filters = path.filters.iter().zip(&drawn.filters);
-    filters.fold(start, |system, (filter, draw)| system.then(&filter.kind.state_space(draw)))
+fn path_system<'a>(
+    path: &Path,
+    gain: f64,
+    draws: impl Iterator<Item = &'a FilterDraw>,
+    weights: &DMatrix<f64>,
+) -> StateSpace {
+    let filters = path.filters.iter().zip(draws);
+    filters.fold(StateSpace::gain(weights * gain), |system, (filter, draw)| {
+        system.then(&filter.kind.state_space(draw))
+    })
 }
 
 /// Blocks as they are gathered.
@@ -383,9 +465,10 @@ impl Parts {
             let weights = DMatrix::from_iterator(1, path.input.len(), weights);
             let inputs = path.input.iter().map(|(signal, _)| signal.clone()).collect();
             let name = path.signal();
-            let states = (path.filters.iter())
-                .flat_map(|filter| numbered(&format!("{name}.{}", filter.name), filter.kind.order()))
-                .collect();
+            let mut states = Vec::new();
+            for filter in &path.filters {
+                states.extend(numbered(&format!("{name}.{}", filter.name), filter.kind.order()));
+            }
             self.add(name.clone(), inputs, vec![name], states, Source::Path(i, weights));
         }
         // An axis without a path has no feedback.

@@ -10,17 +10,17 @@ use super::{names, pattern};
 use crate::spelling::allowed_instead;
 use crate::vehicle::{
     Allocation, Autopilot, Axis, Engine, Filter, FilterKind, ModeSet, Path, Sensor, SensorKind,
-    TransferFunction, autopilot,
+    Tank, TransferFunction, autopilot,
 };
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Checks what the values of `file` mean together, with the engines of the vehicle (`None` where one
-/// could not be resolved) and the modes at its flight times (none without modal data).
+/// Checks what the values of `file` mean together, with the engines and tanks of the vehicle (`None` where
+/// one could not be resolved) and the modes at its flight times (none without modal data).
 pub fn resolve(
     file: &AutopilotFile,
-    engines: Option<&[Engine]>,
+    body: Option<(&[Engine], &[Tank])>,
     sets: &[&ModeSet],
     findings: &mut Findings,
 ) -> Option<Autopilot> {
@@ -38,7 +38,7 @@ pub fn resolve(
         unread(paths, findings);
         algebraic_loops(paths, findings);
     }
-    let allocation = engines.and_then(|e| allocation(&file.allocation, e, sets, findings));
+    let allocation = body.and_then(|body| allocation(&file.allocation, body, sets, findings));
     Some(Autopilot {
         delay_s: file.delay_s,
         delay_order: file.delay_order as usize,
@@ -76,7 +76,11 @@ fn path(
 ) -> Option<Path> {
     names::word(findings, &format!("{key}.name"), &file.name);
     if file.input.is_empty() {
-        findings.push(format!("{key}.input"), "an empty table", "at least one signal and its weight");
+        findings.push(
+            format!("{key}.input"),
+            "an empty table",
+            "at least one signal and its weight",
+        );
     }
     for signal in file.input.keys().filter(|signal| !known.contains(signal)) {
         let allowed = allowed_instead(signal, known.iter().map(String::as_str));
@@ -228,10 +232,11 @@ fn algebraic_loops(paths: &[Path], findings: &mut Findings) {
 
 fn allocation(
     file: &AllocationFile,
-    engines: &[Engine],
+    body: (&[Engine], &[Tank]),
     sets: &[&ModeSet],
     findings: &mut Findings,
 ) -> Option<Allocation> {
+    let engines = body.0;
     let all: Vec<((usize, usize), String)> = (engines.iter().enumerate())
         .flat_map(|(e, engine)| {
             [0, 1].map(|a| ((e, a), format!("{}.{}", engine.path(), engine.actuators[a].name)))
@@ -262,7 +267,7 @@ fn allocation(
             findings.push("autopilot.allocation.matrix", found, allowed);
             return None;
         }
-        None => derived(file, &gimbals, engines, sets, findings)?,
+        None => derived(file, &gimbals, body, sets, findings)?,
     };
     Some(Allocation { gimbals, matrix })
 }
@@ -271,7 +276,7 @@ fn allocation(
 fn derived(
     file: &AllocationFile,
     gimbals: &[(usize, usize)],
-    engines: &[Engine],
+    (engines, tanks): (&[Engine], &[Tank]),
     sets: &[&ModeSet],
     findings: &mut Findings,
 ) -> Option<Vec<[f64; 3]>> {
@@ -295,6 +300,11 @@ fn derived(
         mass += engine.nozzle.mass_kg;
         moment += cg * engine.nozzle.mass_kg;
     }
+    for tank in tanks.iter().filter(|tank| !tank.in_modes) {
+        let slosh = tank.mass_kg(set.flight_time_s);
+        mass += slosh;
+        moment += place(&tank.grid)? * slosh;
+    }
     let cg = moment / mass;
     let moments: Vec<Vector3<f64>> = (gimbals.iter())
         .map(|&(e, axis)| {
@@ -306,7 +316,8 @@ fn derived(
         .collect::<Option<_>>()?;
     let matrix = autopilot::least_squares(&moments);
     if matrix.is_none() {
-        let found = format!("{} gimbals that do not turn the vehicle about three axes", gimbals.len());
+        let found =
+            format!("{} gimbals that do not turn the vehicle about three axes", gimbals.len());
         let allowed = "gimbals with authority in roll, pitch and yaw, or a `matrix`";
         findings.push("autopilot.allocation.gimbals", found, allowed);
     }

@@ -5,13 +5,12 @@
 use super::gimbal::{self, Refusal};
 use super::table::Findings;
 use super::vehicle_file::{EngineFile, MotorFile, VehicleFile};
-use super::{actuator, autopilot, names, pattern};
+use super::{actuator, aerodynamics, autopilot, names, pattern, tank};
 use crate::dynamics::virtual_grid::Geometry;
 use crate::problem::Problems;
 use crate::spelling::allowed_instead;
 use crate::vehicle::{
-    Ablation, Actuator, ActuatorSet, Autopilot, Engine, Modal, ModeSet, Motor, NamedMode, Nozzle,
-    Vehicle,
+    Ablation, Actuator, ActuatorSet, Engine, Modal, ModeSet, Motor, NamedMode, Nozzle, Vehicle,
 };
 use nalgebra::{Matrix3x2, Vector3};
 use std::sync::Arc;
@@ -26,7 +25,8 @@ pub struct Resolved {
 }
 
 /// First segments of the parameter paths that belong to no engine.
-const RESERVED_GROUPS: [&str; 3] = ["structure", "modes", "autopilot"];
+const RESERVED_GROUPS: [&str; 7] =
+    ["structure", "modes", "tank", "body", "aerodynamics", "autopilot", "sensor"];
 
 /// How far an attach point may move from one flight time to the next, m: nothing but rounding.
 const SAME_PLACE_M: f64 = 1e-6;
@@ -43,18 +43,32 @@ pub fn resolve(
 ) -> Result<Resolved, Problems> {
     let mut resolver = Resolver { file, sets: Vec::new(), findings: &mut findings };
     let parts = resolver.resolve(modal.as_ref());
-    let resolved = parts.zip(modal).map(|(parts, modal)| Resolved {
-        vehicle: Vehicle {
-            name: file.name.clone(),
-            structural_damping: file.structure.damping_ratio,
-            band_time_s: file.structure.band_time_s,
-            named_modes: parts.named_modes,
-            engines: parts.engines,
-            autopilot: parts.autopilot,
-            modal,
-        },
-        flight_times_s: file.flight_times_s.clone(),
-    });
+    let tanks = tank::resolve(file, &resolver.sets, modal.as_ref(), resolver.findings);
+    let aerodynamics = aerodynamics::resolve(file, modal.as_ref(), resolver.findings);
+    let engines = parts.as_ref().map(|(engines, _)| engines.as_slice());
+    let body = engines.zip(tanks.as_deref());
+    let autopilot = (file.autopilot.as_ref())
+        .map(|file| autopilot::resolve(file, body, &resolver.sets, resolver.findings));
+    // One that is there but wrong leaves no vehicle.
+    let autopilot = autopilot.map_or(Some(None), |autopilot| autopilot.map(Some));
+    let parts = parts.zip(tanks).zip(aerodynamics).zip(autopilot).zip(modal);
+    let resolved =
+        parts.map(|(((((engines, named_modes), tanks), aerodynamics), autopilot), modal)| {
+            Resolved {
+                vehicle: Vehicle {
+                    name: file.name.clone(),
+                    structural_damping: file.structure.damping_ratio,
+                    band_time_s: file.structure.band_time_s,
+                    named_modes,
+                    engines,
+                    tanks,
+                    aerodynamics,
+                    autopilot,
+                    modal,
+                },
+                flight_times_s: file.flight_times_s.clone(),
+            }
+        });
     findings.finish(resolved)
 }
 
@@ -66,13 +80,6 @@ struct Place {
     action_line: Vector3<f64>,
 }
 
-/// What a vehicle file says beside the modal data.
-struct Parts {
-    engines: Vec<Engine>,
-    named_modes: Vec<NamedMode>,
-    autopilot: Option<Autopilot>,
-}
-
 struct Resolver<'a> {
     file: &'a VehicleFile,
     /// Mode sets at the flight times of the file; empty without modal data.
@@ -81,7 +88,7 @@ struct Resolver<'a> {
 }
 
 impl<'a> Resolver<'a> {
-    fn resolve(&mut self, modal: Option<&'a Modal>) -> Option<Parts> {
+    fn resolve(&mut self, modal: Option<&'a Modal>) -> Option<(Vec<Engine>, Vec<NamedMode>)> {
         if self.file.name.trim().is_empty() {
             self.findings.push("name", "an empty text", "a name");
         }
@@ -103,14 +110,7 @@ impl<'a> Resolver<'a> {
         }
         let named_modes = self.named_modes(modal);
         let engines: Option<Vec<Engine>> = engines.into_iter().collect();
-        let autopilot = self.file.autopilot.as_ref().map(|file| {
-            autopilot::resolve(file, engines.as_deref(), &self.sets, self.findings)
-        });
-        let autopilot = match autopilot {
-            Some(resolved) => Some(resolved?),
-            None => None,
-        };
-        Some(Parts { engines: engines?, named_modes, autopilot })
+        Some((engines?, named_modes))
     }
 
     fn flight_times(&mut self, modal: Option<&'a Modal>) {
@@ -343,7 +343,9 @@ impl<'a> Resolver<'a> {
                 return None;
             };
             match set {
-                None => places = [first, second].map(|a| self.place(&format!("{key}[{a}]"), engine, a)),
+                None => {
+                    places = [first, second].map(|a| self.place(&format!("{key}[{a}]"), engine, a))
+                }
                 Some(set) => {
                     names::word(self.findings, &format!("{key}[{first}].set"), set);
                     self.no_place(&key, engine, [first, second]);
@@ -372,7 +374,8 @@ impl<'a> Resolver<'a> {
                 ("action_line", file.action_line.is_some()),
             ] {
                 if given {
-                    let allowed = "nothing: a set stands in the place of the engine's own actuators";
+                    let allowed =
+                        "nothing: a set stands in the place of the engine's own actuators";
                     self.findings.push(format!("{key}[{a}].{name}"), "a value", allowed);
                 }
             }
@@ -420,12 +423,7 @@ impl<'a> Resolver<'a> {
     }
 
     /// The attach point from the gimbal, by the grids' positions, the same at every flight time.
-    fn attach_point(
-        &mut self,
-        key: &str,
-        engine: &EngineFile,
-        grid: &str,
-    ) -> Option<Vector3<f64>> {
+    fn attach_point(&mut self, key: &str, engine: &EngineFile, grid: &str) -> Option<Vector3<f64>> {
         let arms: Vec<Vector3<f64>> = self
             .sets
             .iter()

@@ -165,9 +165,8 @@ mod tests {
         }
         // Roll: opposite rotations about y; pitch and yaw: equal ones about y and z.
         let column = |j: usize| matrix.iter().map(|row| row[j].abs()).collect::<Vec<_>>();
-        for (j, expected) in [[1.0, 0.0, 1.0, 0.0], [1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]]
-            .iter()
-            .enumerate()
+        for (j, expected) in
+            [[1.0, 0.0, 1.0, 0.0], [1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]].iter().enumerate()
         {
             for (found, expected) in column(j).iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-12);
@@ -179,7 +178,8 @@ mod tests {
     #[test]
     fn one_engine_on_the_centreline_cannot_roll() {
         let at = Vector3::new(30.0, 0.0, 0.0);
-        let moments = [Vector3::y(), Vector3::z()].map(|axis| at.cross(&axis.cross(&-Vector3::x())));
+        let moments =
+            [Vector3::y(), Vector3::z()].map(|axis| at.cross(&axis.cross(&-Vector3::x())));
         assert_eq!(least_squares(&moments), None);
     }
 }

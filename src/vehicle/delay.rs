@@ -55,8 +55,7 @@ mod tests {
         let (mut above, mut below) = (Complex::new(1.0, 0.0), Complex::new(1.0, 0.0));
         let mut power = Complex::new(1.0, 0.0);
         for k in 1..=order {
-            coefficient *=
-                (order + 1 - k) as f64 / (k as f64 * (2 * order + 1 - k) as f64);
+            coefficient *= (order + 1 - k) as f64 / (k as f64 * (2 * order + 1 - k) as f64);
             power *= z;
             above += power * coefficient * if k % 2 == 0 { 1.0 } else { -1.0 };
             below += power * coefficient;

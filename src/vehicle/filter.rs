@@ -108,7 +108,13 @@ impl FilterKind {
             Self::Lag { .. } | Self::LeadLag { .. } | Self::Integrator => 1,
             Self::Bending { .. } | Self::LowPass { .. } => 2,
             Self::Rational(function) => function.order(),
-            Self::Delay { order, .. } => if self.has_delay() { *order } else { 0 },
+            Self::Delay { order, .. } => {
+                if self.has_delay() {
+                    *order
+                } else {
+                    0
+                }
+            }
         }
     }
 
@@ -144,9 +150,8 @@ impl FilterKind {
                 .expect("filters are proper and their numbers finite")
                 .state_space()
         };
-        let quadratic = |omega: f64, zeta: f64| {
-            [1.0 / (omega * omega), 2.0 * zeta * draw.damping / omega, 1.0]
-        };
+        let quadratic =
+            |omega: f64, zeta: f64| [1.0 / (omega * omega), 2.0 * zeta * draw.damping / omega, 1.0];
         let system = match self {
             Self::Gain(value) => StateSpace::gain(DMatrix::from_element(1, 1, *value)),
             Self::Lag { omega_rad_s } => ratio(&[1.0], &[1.0 / omega_rad_s, 1.0]),
@@ -205,7 +210,10 @@ mod tests {
                     let expected = kind.response(&draw, s);
                     let found = system.response(s).unwrap()[(0, 0)];
                     // The Padé approximation [8/8] is off by (ωτ)^17 (8!)²/(16! 17!) = 2e-12 at ωτ = 3.
-                    assert!((found - expected).norm() < 1e-11 * expected.norm().max(1.0), "{kind:?}");
+                    assert!(
+                        (found - expected).norm() < 1e-11 * expected.norm().max(1.0),
+                        "{kind:?}"
+                    );
                 }
             }
         }

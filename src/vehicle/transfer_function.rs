@@ -155,9 +155,11 @@ mod tests {
     #[test]
     fn a_realisation_of_poles_in_one_place_has_entries_of_their_size() {
         // ((s + 40)/40)⁻⁶: coefficients from 2.4e-10 to 1.
-        let coefficients: Vec<f64> =
-            [1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0].iter().enumerate()
-                .map(|(i, c)| c / 40_f64.powi(6 - i as i32)).collect();
+        let coefficients: Vec<f64> = [1.0, 6.0, 15.0, 20.0, 15.0, 6.0, 1.0]
+            .iter()
+            .enumerate()
+            .map(|(i, c)| c / 40_f64.powi(6 - i as i32))
+            .collect();
         let system = TransferFunction::new(&[1.0], &coefficients).unwrap().state_space();
         assert!(system.a.amax() < 40.0 * 21.0, "{}", system.a);
         assert!((system.response(Complex::new(0.0, 0.0)).unwrap()[(0, 0)].re - 1.0).abs() < 1e-13);

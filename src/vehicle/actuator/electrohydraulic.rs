@@ -57,8 +57,7 @@ impl Electrohydraulic {
         let velocity = self.valve_flow_gain_m3_s_a * self.position_gain_a_m / area;
         let valve = self.valve_flow_gain_m3_s_a / self.valve_pressure_gain_pa_a;
         let still = (valve + self.leakage_m3_s_pa) / (area * area);
-        let feedback =
-            self.valve_flow_gain_m3_s_a * self.pressure_feedback_a_pa / (area * area);
+        let feedback = self.valve_flow_gain_m3_s_a * self.pressure_feedback_a_pa / (area * area);
         let relief = velocity / self.load_path_stiffness_n_m + still + feedback;
         let (arm, corner) = (self.arm_m, self.pressure_corner_rad_s);
         let drive = stiffness * velocity * arm;
