@@ -112,7 +112,12 @@ fn what_is_wrong_with_an_autopilot_is_said_with_its_key() {
             "autopilot.sensor[0].grid",
             "did you mean `core.1.gimbal`",
         ),
-        ("name = \"roll_rate\"", "name = \"roll\"", "autopilot.path[1].name", "_"),
+        (
+            "[[autopilot.path]]",
+            "[[autopilot.sensor]]\nname = \"aft\"\nkind = \"attitude\"\ngrid = \"core.1.rock\"\n\n[[autopilot.path]]",
+            "autopilot.sensor[2].name",
+            "again",
+        ),
         (
             "\"gyro.aft.roll\" = 1.0",
             "\"gyro.aft.rol\" = 1.0",
