@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 const LAYERS: [&[&str]; 9] = [
     &["problem", "spelling", "stats"],
     &["vehicle"],
-    &["dynamics", "dispersion", "structure"],
+    &["dynamics", "dispersion", "structure", "fem"],
     &["modal"],
     &["campaign"],
     &["gate"],

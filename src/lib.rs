@@ -12,6 +12,7 @@ pub mod campaign;
 pub mod cli;
 pub mod dispersion;
 pub mod dynamics;
+pub mod fem;
 pub mod gate;
 pub mod io;
 pub mod modal;
