@@ -3,6 +3,7 @@
 //! Values in, values out: files are read in `fem` and `io`, what the user asks for is understood in
 //! `scenario::import`.
 
+pub mod made;
 pub mod model;
 pub mod normalise;
 pub mod plausible;
@@ -11,6 +12,7 @@ pub mod section;
 pub mod systems;
 pub mod units;
 
+pub use made::{Chosen, Made, MadeTime, Moved};
 pub use model::{Frame, Model};
 pub use rigid::RigidBody;
 pub use section::Section;

@@ -53,7 +53,9 @@ pub struct Fit {
     pub shape: Vector3<f64>,
     /// Rotation, as the shape's per metre.
     pub slope: Vector3<f64>,
-    /// Weighted root mean square of what the rigid motion leaves, over that of the motion, 0 to 1.
+    /// Weighted root mean square of what the rigid motion leaves, as the shape's.
+    pub misfit: f64,
+    /// The misfit over the root mean square of the motion, 0 to 1.
     pub residual: f64,
     /// Standard deviation of the rotation if the misfit is taken for scatter between grids, as the
     /// shape's per metre. Zero where three grids leave none.
@@ -138,6 +140,7 @@ impl Section {
         Fit {
             shape: mean + slope.cross(&self.to_point_m),
             slope,
+            misfit: misfit.sqrt(),
             residual: if motion > 0.0 { (misfit / motion).sqrt() } else { 0.0 },
             scatter: deviation(spread) * variance.sqrt(),
             rounding: deviation(rounded),
