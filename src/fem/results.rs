@@ -7,6 +7,9 @@ use std::collections::BTreeMap;
 
 use crate::problem::Problems;
 
+/// Problems of one kind told before the rest is left out: a damaged file can have millions.
+const MOST_PROBLEMS: usize = 20;
+
 /// The content of one result file, or of several that complete each other ([`Results::merge`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Results {
@@ -14,6 +17,11 @@ pub struct Results {
     pub program: String,
     /// How exactly the eigenvectors are stored.
     pub precision: Precision,
+    /// Units the file declares, in its own words; nothing is converted.
+    pub units: Option<String>,
+    /// The eigenvectors are along the basic axes whatever the displacement systems of the nodes:
+    /// [`Results::finish`] and [`Results::merge`] then set those to 0.
+    pub basic_shapes: bool,
     /// Coordinate systems by id; the basic system 0 is not among them.
     pub systems: BTreeMap<i64, System>,
     /// Grids in ascending id.
@@ -135,6 +143,8 @@ impl Results {
         Self {
             program: program.into(),
             precision,
+            units: None,
+            basic_shapes: false,
             systems: BTreeMap::new(),
             nodes: Vec::new(),
             modes: Vec::new(),
@@ -142,6 +152,145 @@ impl Results {
             mass: None,
             warnings: Vec::new(),
         }
+    }
+
+    /// Puts nodes, modes and shapes in ascending order, as every reader does in the end.
+    ///
+    /// # Errors
+    /// Numbers that are not finite; a node, mode or shape given twice; a mode without a shape.
+    pub fn finish(mut self, name: &str) -> Result<Self, Problems> {
+        let mut problems = Problems::default();
+        let damage = |problems: &mut Problems, key: String, found: String, allowed: &str| {
+            if problems.0.len() < MOST_PROBLEMS {
+                problems.extend(Problems::damage(name, key, found, allowed));
+            }
+        };
+        self.nodes.sort_by_key(|node| node.id);
+        self.nodes.dedup_by(|b, a| a.id == b.id && same_node(a, b));
+        for pair in self.nodes.windows(2).filter(|pair| pair[0].id == pair[1].id) {
+            let found = format!("{:?} and {:?}", pair[0], pair[1]);
+            damage(&mut problems, format!("node {}", pair[0].id), found, "one definition");
+        }
+        for node in self.nodes.iter().filter(|n| !n.position.iter().all(|x| x.is_finite())) {
+            let found = format!("position {:?}", node.position);
+            damage(&mut problems, format!("node {}", node.id), found, "finite numbers");
+        }
+        for system in self.systems.values() {
+            let finite = [system.a, system.b, system.c].iter().all(|point| match point {
+                Point::Node(_) => true,
+                Point::Given { position, .. } => position.iter().all(|x| x.is_finite()),
+            });
+            if !finite || system.id <= 0 {
+                let key = format!("coordinate system {}", system.id);
+                damage(&mut problems, key, format!("{system:?}"), "finite numbers, id above 0");
+            }
+        }
+        self.modes.sort_by_key(|mode| mode.number);
+        for pair in self.modes.windows(2).filter(|pair| pair[0].number == pair[1].number) {
+            let found = "two eigenvectors, of several subcases or runs".into();
+            damage(&mut problems, format!("mode {}", pair[0].number), found, "one of each number");
+        }
+        for mode in &mut self.modes {
+            let key = |node| format!("mode {}: node {node}", mode.number);
+            mode.shape.sort_by_key(|shape| shape.node);
+            for pair in mode.shape.windows(2).filter(|pair| pair[0].node == pair[1].node) {
+                damage(&mut problems, key(pair[0].node), "two values".into(), "one value");
+            }
+            for shape in &mode.shape {
+                let mut all = shape.translation.iter().chain(shape.rotation.iter().flatten());
+                if !all.all(|x| x.is_finite()) {
+                    damage(&mut problems, key(shape.node), format!("{shape:?}"), "finite numbers");
+                }
+            }
+            if !mode.frequency_hz.is_finite() || mode.shape.is_empty() {
+                let found = format!("{} Hz, {} nodes", mode.frequency_hz, mode.shape.len());
+                let key = format!("mode {}", mode.number);
+                damage(&mut problems, key, found, "a finite frequency and a shape");
+            }
+        }
+        for members in self.sets.values_mut() {
+            members.sort_unstable();
+            members.dedup();
+        }
+        if let Some(mass) = &mut self.mass {
+            mass.sort_by_key(|(node, _)| *node);
+        }
+        self.forget_displacement_systems();
+        problems.into_result(self)
+    }
+
+    fn forget_displacement_systems(&mut self) {
+        if self.basic_shapes {
+            for node in &mut self.nodes {
+                node.displacement_system = 0;
+            }
+        }
+    }
+
+    /// Checks that the parts together describe modes: eigenvectors, the grids they belong to and
+    /// every coordinate system that is named.
+    ///
+    /// # Errors
+    /// No eigenvectors, no grids, eigenvectors at none of the grids, and systems or nodes that are
+    /// named but not there.
+    pub fn complete(&self, name: &str) -> Result<(), Problems> {
+        let mut problems = Problems::default();
+        let mut input = |key: &str, found: &str, allowed: &str| {
+            problems.extend(Problems::input(name, key, found, allowed));
+        };
+        let is_node = |id: i64| self.nodes.binary_search_by_key(&id, |node| node.id).is_ok();
+        if self.modes.is_empty() {
+            input(
+                "modes",
+                "grids without results",
+                "real eigenvectors of a normal modes solution, from this or another file",
+            );
+        }
+        if self.nodes.is_empty() {
+            input(
+                "nodes",
+                "eigenvectors without grids",
+                "grids, from this or another file (for a punch file its bulk data deck)",
+            );
+        } else if !self.modes.is_empty() {
+            let none = |mode: &RawMode| !mode.shape.iter().any(|shape| is_node(shape.node));
+            if self.modes.iter().all(none) {
+                input("modes", "eigenvectors at none of the grids", "files of one model");
+            }
+        }
+        let missing = |id: i64| id != 0 && !self.systems.contains_key(&id);
+        let mut named: BTreeMap<i64, String> = BTreeMap::new();
+        for node in &self.nodes {
+            for id in [node.position_system, node.displacement_system] {
+                if missing(id) {
+                    named.entry(id).or_insert_with(|| format!("node {}", node.id));
+                }
+            }
+        }
+        for system in self.systems.values() {
+            for point in [system.a, system.b, system.c] {
+                match point {
+                    Point::Given { reference, .. } if missing(reference) => {
+                        let by = || format!("coordinate system {}", system.id);
+                        named.entry(reference).or_insert_with(by);
+                    }
+                    Point::Node(id) if !self.nodes.is_empty() && !is_node(id) => input(
+                        &format!("coordinate system {}", system.id),
+                        &format!("node {id}, which is not there"),
+                        "nodes of the model",
+                    ),
+                    _ => {}
+                }
+            }
+        }
+        for (id, by) in named.iter().take(MOST_PROBLEMS) {
+            input(
+                &format!("coordinate system {id}"),
+                &format!("no definition, but {by} names it"),
+                "a definition in one of the files (give the deck, and the files it includes)",
+            );
+        }
+        problems.into_result(())
     }
 
     /// Completes these results by another part, for instance a punch file by its deck.
@@ -214,11 +363,14 @@ impl Results {
         }
         problems.into_result(())?;
         self.nodes = nodes.into_values().collect();
+        self.units = self.units.take().or(other.units);
         if !other.modes.is_empty() {
+            self.basic_shapes = other.basic_shapes;
             self.precision = other.precision;
             self.program = other.program;
             self.modes = other.modes;
         }
+        self.forget_displacement_systems();
         self.mass = self.mass.take().or(other.mass);
         for warning in other.warnings {
             if !self.warnings.contains(&warning) {
