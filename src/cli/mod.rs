@@ -9,6 +9,7 @@ pub mod completions;
 pub mod error;
 pub mod gate;
 pub mod how_many;
+pub mod import;
 pub mod init;
 pub mod interrupt;
 pub mod modes;
@@ -53,6 +54,7 @@ enum Command {
     Check(check::Args),
     Plan(plan::Args),
     Modes(modes::Args),
+    Import(import::Args),
     Nominal(nominal::Args),
     Run(run::Args),
     Summary(summary::Args),
@@ -107,6 +109,7 @@ pub fn run() -> ExitCode {
         Command::Check(args) => check::run(args, &mut out),
         Command::Plan(args) => plan::run(args, &mut out),
         Command::Modes(args) => modes::run(args, &mut out),
+        Command::Import(args) => import::run(args, &mut out),
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),

@@ -4,6 +4,7 @@ pub mod column;
 pub mod files;
 pub mod flat;
 pub mod folder;
+pub mod import;
 pub mod inputs;
 pub mod manifest;
 pub mod package;

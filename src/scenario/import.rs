@@ -31,9 +31,6 @@ const SKEW: f64 = 1e-4;
 const MASS_APART: f64 = 0.02;
 /// Least relative difference of frequencies under which modes count as repeated.
 const REPEATED: f64 = 1e-6;
-/// Rise of the frequency from one mode to the next, after this many modes, above which the rest
-/// look like residual vectors.
-const RISE: (f64, usize) = (3.0, 6);
 /// Rounding of a slope over the greatest of its mode above which it is reported.
 const COARSE: f64 = 0.01;
 /// Misfit of a section over the greatest motion of its mode below which it tells nothing.
@@ -379,7 +376,7 @@ impl Resolver<'_> {
             .take_while(|place| asked.max_hz.is_none_or(|most| hz(place) <= most))
             .take(asked.count.unwrap_or(usize::MAX))
             .collect();
-        let Some(first) = kept.first() else {
+        if kept.is_empty() {
             let found = format!(
                 "no elastic mode up to {} Hz at {time_s} s, the first at {} Hz",
                 asked.max_hz.unwrap_or(f64::INFINITY),
@@ -387,23 +384,6 @@ impl Resolver<'_> {
             );
             self.push("modes.max_hz", found, "a frequency above the first elastic mode");
             return None;
-        };
-        if hz(first).is_nan() {
-            return None;
-        }
-        let rise = (kept.windows(2).enumerate().skip(RISE.1))
-            .find(|(_, pair)| !(hz(&pair[1]) <= RISE.0 * hz(&pair[0])));
-        if let Some((at, pair)) = rise {
-            self.warn(
-                time_s,
-                format!(
-                    "the frequency rises from {:.4} to {:.4} Hz after {} elastic modes: what \
-                     follows looks like residual vectors; leave them out by max_hz or count",
-                    hz(&pair[0]),
-                    hz(&pair[1]),
-                    at + 1
-                ),
-            );
         }
         Some(kept)
     }
