@@ -111,9 +111,12 @@ fn show(args: &Args, dir: &Path, out: &mut dyn Write) -> Result<u8, Error> {
         let allowed = allowed_instead(unknown, known());
         return Err(Error::Usage(format!("no grid `{unknown}`; allowed: {allowed}")));
     }
-    let role = |name: &str| import.as_ref().and_then(|i| i.roles.get(name)).map(String::as_str);
-    let is_gimbal = |name: &str| match args.gimbal.as_slice() {
-        [] => role(name).map_or(name.rsplit('.').next() == Some("gimbal"), |r| r == "gimbal"),
+    let given = match (&import, args.gimbal.as_slice()) {
+        (Some(import), []) => import.roles.get("gimbal").cloned().unwrap_or_default(),
+        (_, given) => given.to_vec(),
+    };
+    let is_gimbal = |name: &str| match given.as_slice() {
+        [] => name.rsplit('.').next() == Some("gimbal"),
         given => given.iter().any(|g| g == name),
     };
     let gimbals: Vec<&str> = known().filter(|name| is_gimbal(name)).collect();

@@ -25,6 +25,8 @@ pub enum UnitSystem {
     Si,
     /// Millimetre, tonne, newton.
     MmTS,
+    /// Millimetre, kilogram, millinewton.
+    MmKgS,
     /// Inch, pound-force; mass in lbf·s²/in.
     InLbf,
     /// Inch, pound-force; mass in pounds, brought to lbf·s²/in by `wtmass`.
@@ -33,13 +35,14 @@ pub enum UnitSystem {
 
 impl UnitSystem {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Si, Self::MmTS, Self::InLbf, Self::InLbm];
+    pub const ALL: [Self; 5] = [Self::Si, Self::MmTS, Self::MmKgS, Self::InLbf, Self::InLbm];
 
     /// The word of the import description.
     pub fn word(self) -> &'static str {
         match self {
             Self::Si => "si",
             Self::MmTS => "mm-t-s",
+            Self::MmKgS => "mm-kg-s",
             Self::InLbf => "in-lbf",
             Self::InLbm => "in-lbm",
         }
@@ -54,6 +57,7 @@ impl UnitSystem {
         let units = match self {
             Self::Si => Units { length_m: 1.0, mass_kg: 1.0, listed_kg: 1.0 },
             Self::MmTS => Units { length_m: 1e-3, mass_kg: 1e3, listed_kg: 1e3 },
+            Self::MmKgS => Units { length_m: 1e-3, mass_kg: 1.0, listed_kg: 1.0 },
             Self::InLbf => Units { length_m: INCH_M, mass_kg: slinch_kg, listed_kg: slinch_kg },
             Self::InLbm => {
                 let wtmass = wtmass.ok_or((

@@ -168,9 +168,9 @@ pub struct ImportHeader {
     /// BLAKE3 digest of each file that was read, by its name in the description.
     #[serde(default)]
     pub inputs: BTreeMap<String, String>,
-    /// Role of each grid that has one.
+    /// Grids by their role.
     #[serde(default)]
-    pub roles: BTreeMap<String, String>,
+    pub roles: BTreeMap<String, Vec<String>>,
     /// Rigid-body modes of each flight time.
     #[serde(default)]
     pub rigid_body_mode: Vec<RigidHeader>,
@@ -240,13 +240,17 @@ pub fn write_imported(
             residual: mode.residual,
         })
     });
+    let mut roles: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for (grid, role) in &made.roles {
+        roles.entry((*role).to_owned()).or_default().push(grid.clone());
+    }
     let import = ImportHeader {
         programs,
         units: units.to_owned(),
         warnings: made.warnings.clone(),
         sections_blake3: None,
         inputs,
-        roles: made.roles.iter().map(|(grid, role)| (grid.clone(), (*role).to_owned())).collect(),
+        roles,
         rigid_body_mode: rigid.collect(),
     };
     let mut sections = Table::new(&SECTIONS);

@@ -3,7 +3,7 @@
 //! The modes themselves are shown by `modes`.
 
 use super::significant;
-use crate::import::Made;
+use crate::import::{Chosen, Made};
 use std::fmt::Write;
 
 /// The findings of an import.
@@ -55,9 +55,17 @@ pub fn findings(made: &Made) -> String {
     }
     if let Some(time) = made.times.first() {
         let _ = writeln!(text, "grids, at {} s:", time.flight_time_s);
-        for chosen in &time.chosen {
-            let role = made.roles.get(&chosen.grid).map_or(String::new(), |r| format!(" ({r})"));
-            let _ = writeln!(text, "  {}{role}: {}", chosen.grid, chosen.from);
+        // A row of grids that are made alike is one line.
+        let row =
+            |name: &str| name.rsplit_once('.').map_or(String::new(), |(row, _)| row.to_owned());
+        let alike = |a: &Chosen, b: &Chosen| {
+            a.from == b.from && row(&a.grid) == row(&b.grid) && !row(&a.grid).is_empty()
+        };
+        for chosen in time.chosen.chunk_by(alike) {
+            let (first, last) = (&chosen[0], &chosen[chosen.len() - 1]);
+            let role = made.roles.get(&first.grid).map_or(String::new(), |r| format!(" ({r})"));
+            let to = if chosen.len() > 1 { format!(" to {}", last.grid) } else { String::new() };
+            let _ = writeln!(text, "  {}{to}{role}: {}", first.grid, first.from);
         }
     }
     let worst = made.sections.iter().max_by(|a, b| a.residual.total_cmp(&b.residual));

@@ -31,6 +31,9 @@ const SKEW: f64 = 1e-4;
 const MASS_APART: f64 = 0.02;
 /// Least relative difference of frequencies under which modes count as repeated.
 const REPEATED: f64 = 1e-6;
+/// Modes beyond those asked for that may be repetitions of the last: those of a body of revolution
+/// come in pairs.
+const PAIR: usize = 1;
 /// Rounding of a slope over the greatest of its mode above which it is reported.
 const COARSE: f64 = 0.01;
 /// Misfit of a section over the greatest motion of its mode below which it tells nothing.
@@ -228,7 +231,7 @@ impl Resolver<'_> {
             self.warn(time.time_s, warning);
         }
         let body = self.mass(i, time, &estimates, by_modes.err());
-        let kept = self.keep(time.time_s, &model, &rigid)?;
+        let (mut kept, asked) = self.keep(time.time_s, &model, &rigid)?;
         let (choices, body) = (choices?, body?);
         let grids: Vec<_> = grids::package_grids(&choices, &model);
         let mut shapes: Vec<Mode> = (kept.iter())
@@ -249,6 +252,8 @@ impl Resolver<'_> {
         let positions: Vec<_> = grids.iter().map(|g| g.position_m).collect();
         let apart = self.file.modes.repeated.unwrap_or(REPEATED.max(8.0 * model.rounding));
         orient(&mut shapes, &positions, apart);
+        shapes.truncate(asked);
+        kept.truncate(asked);
         self.quality(time.time_s, &model, &generalised, &kept, &choices, &shapes);
         let chosen = choices.iter().map(|c| Chosen { grid: c.name.clone(), from: c.from.clone() });
         let made = MadeTime {
@@ -368,24 +373,31 @@ impl Resolver<'_> {
         }
     }
 
-    /// Places of the elastic modes that the description asks for.
-    fn keep(&mut self, time_s: f64, model: &Model, rigid: &RigidBody) -> Option<Vec<usize>> {
+    /// Places of the elastic modes, and how many of them the description asks for.
+    fn keep(
+        &mut self,
+        time_s: f64,
+        model: &Model,
+        rigid: &RigidBody,
+    ) -> Option<(Vec<usize>, usize)> {
         let asked = &self.file.modes;
         let hz = |&place: &usize| model.modes[place].frequency_hz;
-        let kept: Vec<usize> = (rigid.elastic.iter().copied())
+        let asked = (rigid.elastic.iter())
             .take_while(|place| asked.max_hz.is_none_or(|most| hz(place) <= most))
             .take(asked.count.unwrap_or(usize::MAX))
-            .collect();
-        if kept.is_empty() {
+            .count();
+        if asked == 0 {
             let found = format!(
                 "no elastic mode up to {} Hz at {time_s} s, the first at {} Hz",
-                asked.max_hz.unwrap_or(f64::INFINITY),
+                self.file.modes.max_hz.unwrap_or(f64::INFINITY),
                 hz(&rigid.elastic[0])
             );
             self.push("modes.max_hz", found, "a frequency above the first elastic mode");
             return None;
         }
-        Some(kept)
+        // A pair of repeated modes is oriented as a pair, even where the count cuts through it.
+        let some = rigid.elastic.len().min(asked + PAIR);
+        Some((rigid.elastic[..some].to_vec(), asked))
     }
 
     /// Quality of the sections' rotations, kept and, beyond the bound, told.

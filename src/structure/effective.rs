@@ -6,26 +6,25 @@ use crate::vehicle::{Grid, Mode, ModeSet};
 use nalgebra::Vector3;
 
 /// The six rigid-body modes of the body of `set` on its grids, of unit generalised mass: translation
-/// along x, y and z, rotation about the principal axes nearest to x, y and z.
+/// along x, y and z, rotation of the cg's axes x, y and z, each freed of those before it.
 pub fn rigid_modes(set: &ModeSet) -> Vec<Mode> {
     let body = &set.body;
     let translations = (0..3).map(|k| {
         let shape = Vector3::ith(k, 1.0 / body.mass_kg.sqrt());
         (format!("rigid {}", ["x", "y", "z"][k]), shape, Vector3::zeros())
     });
-    let eigen = body.inertia_kg_m2.symmetric_eigen();
-    let mut left: Vec<usize> = (0..3).collect();
-    let mut rotations = Vec::new();
-    for (k, name) in ["rigid roll", "rigid pitch", "rigid yaw"].into_iter().enumerate() {
-        let along = |&i: &usize| eigen.eigenvectors[(k, i)].abs();
-        let nearest = (left.iter().enumerate())
-            .max_by(|a, b| along(a.1).total_cmp(&along(b.1)))
-            .map_or(0, |(at, _)| at);
-        let i = left.remove(nearest);
-        let axis = eigen.eigenvectors.column(i).into_owned();
-        let axis = if axis[k] < 0.0 { -axis } else { axis };
-        rotations.push((name.to_owned(), Vector3::zeros(), axis / eigen.eigenvalues[i].sqrt()));
+    // Gram and Schmidt by the inertia: the axes themselves where they are principal.
+    let mut axes: Vec<Vector3<f64>> = Vec::new();
+    for k in 0..3 {
+        let mut axis = Vector3::ith(k, 1.0);
+        for other in &axes {
+            axis -= other * (body.inertia_kg_m2 * other).dot(&axis);
+        }
+        axes.push(axis / (body.inertia_kg_m2 * axis).dot(&axis).sqrt());
     }
+    let names = ["rigid roll", "rigid pitch", "rigid yaw"];
+    let rotations = names.into_iter().zip(axes);
+    let rotations = rotations.map(|(name, axis)| (name.to_owned(), Vector3::zeros(), axis));
     translations
         .chain(rotations)
         .map(|(label, shift, turn): (String, Vector3<f64>, Vector3<f64>)| Mode {
@@ -104,13 +103,13 @@ mod tests {
     }
 
     #[test]
-    fn rigid_modes_are_orthonormal_by_mass_and_named_by_their_axes() {
+    fn rigid_modes_are_orthonormal_by_mass_and_roll_is_about_x() {
         let set = set();
         assert!(orthonormality(&set) < 1e-13);
         let modes = rigid_modes(&set);
         let roll = modes[3].slope[0];
         assert_eq!(modes[3].label, "rigid roll");
-        assert!(roll.x > 0.0 && roll.x.abs() > roll.y.abs() + roll.z.abs());
+        assert_eq!(roll, Vector3::x());
     }
 
     #[test]
