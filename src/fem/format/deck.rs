@@ -15,6 +15,9 @@ const SYSTEMS: [(&str, SystemKind, bool); 6] = [
     ("CORD2S", SystemKind::Spherical, false),
 ];
 
+/// A system that a grid leaves to `GRDSET`.
+const BLANK: i64 = i64::MIN;
+
 /// Problems told before the reader gives up.
 const MOST_PROBLEMS: usize = 20;
 
@@ -47,23 +50,22 @@ impl Card {
 pub(super) fn read(bytes: &[u8], name: &str) -> Result<Results, Problems> {
     let mut results = Results::empty("Nastran bulk data deck", Precision::Text { digits: 0 });
     let mut problems = Problems::default();
-    let mut grids = Vec::new();
-    let mut default_systems = (0, 0);
+    // Systems that a grid leaves blank until the whole deck is read: GRDSET may come later.
+    let mut grids: Vec<Node> = Vec::new();
+    let mut default_systems = [0, 0];
     let mut card: Option<Card> = None;
     let mut wanted = |card: Card, results: &mut Results, problems: &mut Problems| {
         if problems.0.len() >= MOST_PROBLEMS {
         } else if card.name == "GRDSET" {
-            default_systems =
-                (integer(&card, 1, 0, name, problems), { integer(&card, 5, 0, name, problems) });
+            default_systems = [1, 5].map(|k| integer(&card, k, 0, name, problems));
         } else if card.name == "GRID" {
-            grids.push(card);
+            grids.extend(grid(&card, name, problems));
         } else {
             system(&card, name, results, problems);
         }
     };
-    let text = String::from_utf8_lossy(bytes);
-    let has_begin = text.lines().any(|line| begins_bulk(line).is_some());
-    let mut bulk = !has_begin;
+    // A file that is included has no BEGIN BULK.
+    let mut bulk = !lines(bytes).any(|(_, line)| begins_bulk(&line).is_some());
     let mut skipped_super = false;
     for (number, line) in lines(bytes) {
         let line = line.split('$').next().unwrap_or("");
@@ -114,20 +116,12 @@ pub(super) fn read(bytes: &[u8], name: &str) -> Result<Results, Problems> {
         wanted(card, &mut results, &mut problems);
     }
     let mut fluid = 0;
-    for card in &grids {
-        if problems.0.len() >= MOST_PROBLEMS {
-            break;
-        }
-        let node = Node {
-            id: integer(card, 0, -1, name, &mut problems),
-            position_system: integer(card, 1, default_systems.0, name, &mut problems),
-            position: [2, 3, 4].map(|k| number(card, k, name, &mut problems)),
-            displacement_system: integer(card, 5, default_systems.1, name, &mut problems),
-        };
-        if node.id <= 0 || node.position_system < 0 {
-            let key = format!("line {}", card.line);
-            let found = format!("GRID {} in system {}", card.field(0), node.position_system);
-            problems.extend(Problems::input(name, key, found, "a positive id"));
+    for mut node in grids {
+        let systems = [&mut node.position_system, &mut node.displacement_system];
+        for (system, default) in systems.into_iter().zip(default_systems) {
+            if *system == BLANK {
+                *system = default;
+            }
         }
         if node.displacement_system < 0 {
             fluid += 1;
@@ -222,6 +216,22 @@ fn number(card: &Card, index: usize, name: &str, problems: &mut Problems) -> f64
         problems.extend(Problems::input(name, key, format!("{text:?}"), "a number"));
         0.0
     })
+}
+
+fn grid(card: &Card, name: &str, problems: &mut Problems) -> Option<Node> {
+    let node = Node {
+        id: integer(card, 0, -1, name, problems),
+        position_system: integer(card, 1, BLANK, name, problems),
+        position: [2, 3, 4].map(|k| number(card, k, name, problems)),
+        displacement_system: integer(card, 5, BLANK, name, problems),
+    };
+    let good = node.id > 0 && (node.position_system >= 0 || node.position_system == BLANK);
+    if !good {
+        let key = format!("line {}", card.line);
+        let found = format!("GRID {:?} in system {:?}", card.field(0), card.field(1));
+        problems.extend(Problems::input(name, key, found, "a positive id"));
+    }
+    good.then_some(node)
 }
 
 fn system(card: &Card, name: &str, results: &mut Results, problems: &mut Problems) {

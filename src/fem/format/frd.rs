@@ -286,9 +286,12 @@ impl<'a> Reader<'a> {
         }
         let printed = real(columns(head, 12, 24));
         let wrong = || self.damage(format!("{head:?}"), "a mode and its frequency");
-        // Generalised stiffness and mass have more digits than the frequency.
+        // From 10 Hz on the frequency is printed with ten digits, below with six, and zero for a
+        // negative eigenvalue; generalised stiffness and mass have seven.
         let frequency_hz = match (step.mass, step.stiffness) {
-            (Some(mass), Some(stiffness)) if mass > 0.0 => frequency_hz(stiffness / mass),
+            (Some(mass), Some(stiffness)) if mass > 0.0 && digits(columns(head, 12, 24)) < 8 => {
+                frequency_hz(stiffness / mass)
+            }
             _ => printed.ok_or_else(wrong)?,
         };
         let number = columns(head, 58, 63).parse().ok();

@@ -172,7 +172,8 @@ fn shape_record(
     let width = words.integer(ident, 9);
     let is_complex = approach == COMPLEX_EIGENVALUES || format != 1;
     let key = format!("table {}: mode {number}", records.table);
-    if is_complex && (approach != COMPLEX_EIGENVALUES || format != 2 || first != 0.0) {
+    let in_parts = [1, 2].contains(&format);
+    if is_complex && (approach != COMPLEX_EIGENVALUES || !in_parts || first != 0.0) {
         return Err(complex(records.name, &key));
     }
     let components = if is_complex { 12 } else { 6 };
@@ -246,12 +247,12 @@ fn geometry_record(
 }
 
 /// Entries of `length` words if they divide the record and all of them pass.
-fn entries<'a>(
+fn entries(
     words: Words,
-    bytes: &'a [u8],
+    bytes: &[u8],
     length: usize,
     passes: impl Fn(&[u8]) -> bool,
-) -> Option<Vec<&'a [u8]>> {
+) -> Option<Vec<&[u8]>> {
     let entries = bytes.chunks_exact(length * words.size);
     let whole = entries.remainder().is_empty() && !bytes.is_empty();
     (whole && entries.clone().all(passes)).then(|| entries.collect())

@@ -163,11 +163,15 @@ impl<'a> Records<'a> {
         Ok(block)
     }
 
-    /// Moves to the next table and gives its name; none at the end of the file.
+    /// Moves to the next table and gives its name; none at the end of the file, which is a key of
+    /// 0: without it the program was stopped or the file is cut.
     pub fn next_table(&mut self) -> Result<Option<String>, Problems> {
         loop {
-            let Some(key) = self.key()? else { return Ok(None) };
+            let key = self.expect_key()?;
             if key == 0 {
+                if self.at == self.bytes.len() {
+                    return Ok(None);
+                }
                 continue;
             }
             if key < 0 {
@@ -190,7 +194,7 @@ impl<'a> Records<'a> {
     /// The next record of the table, its first being the header -2; none at the end of the table.
     pub fn next_record(&mut self) -> Result<Option<Cow<'a, [u8]>>, Problems> {
         let number = self.expect_key()?;
-        let (one, _kind) = (self.expect_key()?, self.expect_key()?);
+        let (one, kind) = (self.expect_key()?, self.expect_key()?);
         if number >= 0 || one != 1 {
             return Err(self.damage(format!("keys {number} and {one}"), "a new record"));
         }
@@ -204,7 +208,8 @@ impl<'a> Records<'a> {
                 // An empty record is one of a matrix; only a key of 0 ends the table.
                 return Ok(record.or(if key < 0 { Some(Cow::Borrowed(&[])) } else { None }));
             }
-            let data = self.data(key)?;
+            // In front of each piece of a matrix column stands its row.
+            let data = self.data(if kind == 0 { key } else { key.saturating_add(1) })?;
             match &mut record {
                 None => record = Some(Cow::Borrowed(data)),
                 // Bounded by the file: each piece is copied once.

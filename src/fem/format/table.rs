@@ -292,7 +292,8 @@ fn masses(rows: &Rows, count: usize, results: &mut Results) -> Result<(), Proble
         let id = rows.id("node", row, 1.0)?;
         let mass = rows.number("mass", row).unwrap_or(f64::NAN);
         let inertia = rows.three(["ixx", "iyy", "izz"], row);
-        if !(mass >= 0.0 && mass.is_finite()) || !inertia.iter().all(|i| *i >= 0.0) {
+        let fine = |value: &f64| *value >= 0.0 && value.is_finite();
+        if !(fine(&mass) && inertia.iter().all(fine)) {
             let found = format!("mass {mass}, inertia {inertia:?}");
             return Err(rows.wrong("mass", row, found, "numbers of at least zero"));
         }

@@ -32,33 +32,46 @@ pub(super) fn recognised(bytes: &[u8]) -> bool {
         })
 }
 
-/// The lines of one dataset, read from its start.
+/// One dataset, read line by line.
 struct Dataset<'a> {
     name: &'a str,
     number: &'a str,
-    lines: &'a [(usize, Cow<'a, str>)],
-    at: usize,
+    rest: &'a [u8],
+    /// The last line that was read, and its number in the file.
+    last: Cow<'a, str>,
+    line: usize,
 }
 
 impl<'a> Dataset<'a> {
-    fn next(&mut self) -> Option<&'a str> {
-        let (_, line) = self.lines.get(self.at)?;
-        self.at += 1;
-        Some(line)
+    fn is_at_end(&self) -> bool {
+        self.rest.is_empty()
+    }
+
+    fn next(&mut self) -> Option<Cow<'a, str>> {
+        if self.is_at_end() {
+            self.last = Cow::Borrowed("the end of the dataset");
+            return None;
+        }
+        self.last = lines(self.rest).next()?.1;
+        let end = self.rest.iter().position(|byte| *byte == b'\n');
+        self.rest = end.map_or(&[][..], |end| &self.rest[end + 1..]);
+        self.line += 1;
+        Some(self.last.clone())
+    }
+
+    fn skip(&mut self, count: usize) {
+        for _ in 0..count {
+            self.next();
+        }
     }
 
     fn wrong(&self, allowed: &str) -> Problems {
-        let last = self.at.saturating_sub(1);
-        let (line, found) = match self.lines.get(last) {
-            Some((line, text)) => (*line, format!("{:?}", text.trim_end())),
-            None => (self.lines.last().map_or(0, |(line, _)| *line), "the end".to_owned()),
-        };
-        let key = format!("dataset {}: line {line}", self.number);
-        Problems::damage(self.name, key, found, allowed)
+        let key = format!("dataset {}: line {}", self.number, self.line);
+        Problems::damage(self.name, key, format!("{:?}", self.last.trim_end()), allowed)
     }
 
     fn integers(&mut self, least: usize, allowed: &str) -> Result<Vec<i64>, Problems> {
-        let values = self.next().and_then(integers).unwrap_or_default();
+        let values = self.next().and_then(|line| integers(&line)).unwrap_or_default();
         if values.len() < least { Err(self.wrong(allowed)) } else { Ok(values) }
     }
 
@@ -68,7 +81,7 @@ impl<'a> Dataset<'a> {
         while values.len() < count {
             let allowed = "the numbers that belong here";
             let line = self.next().ok_or_else(|| self.wrong(allowed))?;
-            let found = reals(line).filter(|found| !found.is_empty());
+            let found = reals(&line).filter(|found| !found.is_empty());
             values.extend(found.ok_or_else(|| self.wrong(allowed))?);
             for token in line.split_ascii_whitespace() {
                 *seen = (*seen).max(digits(token));
@@ -82,40 +95,42 @@ impl<'a> Dataset<'a> {
 pub(super) fn read(bytes: &[u8], name: &str) -> Result<Results, Problems> {
     let mut results = Results::empty("universal file", Precision::Text { digits: 0 });
     let mut shape_digits = 0;
-    let mut subcases: Vec<i64> = Vec::new();
-    let mut all = lines(bytes);
-    let is_mark = |line: &str| line.trim() == "-1";
-    while let Some((start, line)) = all.next() {
-        if !is_mark(&line) {
-            continue;
-        }
-        let Some((_, head)) = all.next() else { break };
-        let mut inside = Vec::new();
-        let mut closed = false;
-        for (number, line) in all.by_ref() {
-            if is_mark(&line) {
-                closed = true;
-                break;
+    let mut solutions: Vec<i64> = Vec::new();
+    // Where the lines after the number of an open dataset start, and that number.
+    let mut open: Option<(usize, usize, &str)> = None;
+    let mut marked = false;
+    let mut at = 0;
+    for (line, text) in bytes.split(|byte| *byte == b'\n').enumerate() {
+        let start = at;
+        at += text.len() + 1;
+        let text = text.trim_ascii();
+        if marked {
+            let number = std::str::from_utf8(text).unwrap_or("");
+            open = Some((line + 1, at.min(bytes.len()), number));
+            marked = false;
+        } else if text != b"-1" {
+        } else if let Some((line, from, number)) = open.take() {
+            let last = Cow::Borrowed("");
+            let mut dataset = Dataset { name, number, rest: &bytes[from..start], last, line };
+            let seen = &mut shape_digits;
+            match number {
+                "15" => nodes_on_one_line(&mut dataset, &mut results)?,
+                "781" | "2411" => nodes_on_two_lines(&mut dataset, &mut results)?,
+                "18" => systems_by_points(&mut dataset, &mut results)?,
+                "2420" => systems_by_matrix(&mut dataset, &mut results)?,
+                "2435" | "2452" | "2467" | "2477" => groups(&mut dataset, &mut results)?,
+                "164" => results.units = units(&mut dataset),
+                "55" => mode_55(&mut dataset, &mut results, seen)?,
+                "2414" => mode_2414(&mut dataset, &mut results, seen, &mut solutions)?,
+                _ => {}
             }
-            inside.push((number, line));
+        } else {
+            marked = true;
         }
-        let number = head.trim();
-        if !closed {
-            let key = format!("dataset {number} of line {start}");
-            return Err(Problems::damage(name, key, "the end of the file", "a closing -1"));
-        }
-        let mut dataset = Dataset { name, number, lines: &inside, at: 0 };
-        match number {
-            "15" => nodes_on_one_line(&mut dataset, &mut results)?,
-            "781" | "2411" => nodes_on_two_lines(&mut dataset, &mut results)?,
-            "18" => systems_by_points(&mut dataset, &mut results)?,
-            "2420" => systems_by_matrix(&mut dataset, &mut results)?,
-            "2435" | "2452" | "2467" | "2477" => groups(&mut dataset, &mut results)?,
-            "164" => results.units = units(&mut dataset),
-            "55" => mode_55(&mut dataset, &mut results, &mut shape_digits)?,
-            "2414" => mode_2414(&mut dataset, &mut results, &mut shape_digits, &mut subcases)?,
-            _ => {}
-        }
+    }
+    if let Some((line, _, number)) = open {
+        let key = format!("dataset {number} of line {line}");
+        return Err(Problems::damage(name, key, "the end of the file", "a closing -1"));
     }
     results.precision = Precision::Text { digits: shape_digits };
     ground(&mut results);
@@ -160,7 +175,7 @@ fn nodes_on_one_line(dataset: &mut Dataset, results: &mut Results) -> Result<(),
 }
 
 fn nodes_on_two_lines(dataset: &mut Dataset, results: &mut Results) -> Result<(), Problems> {
-    while dataset.at < dataset.lines.len() {
+    while !dataset.is_at_end() {
         let head = dataset.integers(3, "node and its systems")?;
         let position = dataset.reals(3, &mut 0)?;
         results.nodes.push(Node {
@@ -198,7 +213,7 @@ fn unit(a: [f64; 3]) -> [f64; 3] {
 }
 
 fn systems_by_points(dataset: &mut Dataset, results: &mut Results) -> Result<(), Problems> {
-    while dataset.at < dataset.lines.len() {
+    while !dataset.is_at_end() {
         let head = dataset.integers(3, "system, type and reference system")?;
         let kind = kind(head[1]).ok_or_else(|| dataset.wrong("type 0, 1 or 2"))?;
         dataset.next();
@@ -219,7 +234,7 @@ fn systems_by_points(dataset: &mut Dataset, results: &mut Results) -> Result<(),
 fn systems_by_matrix(dataset: &mut Dataset, results: &mut Results) -> Result<(), Problems> {
     dataset.next();
     dataset.next();
-    while dataset.at < dataset.lines.len() {
+    while !dataset.is_at_end() {
         let head = dataset.integers(2, "system and type")?;
         let kind = kind(head[1]).ok_or_else(|| dataset.wrong("type 0, 1 or 2"))?;
         dataset.next();
@@ -246,9 +261,9 @@ fn place(
 }
 
 fn groups(dataset: &mut Dataset, results: &mut Results) -> Result<(), Problems> {
-    while dataset.at < dataset.lines.len() {
+    while !dataset.is_at_end() {
         let head = dataset.integers(8, "group and the number of its entities")?;
-        let name = dataset.next().ok_or_else(|| dataset.wrong("the name of the group"))?.trim();
+        let name = dataset.next().ok_or_else(|| dataset.wrong("the name of the group"))?;
         let mut rest = head[7];
         let mut nodes = Vec::new();
         while rest > 0 {
@@ -261,7 +276,7 @@ fn groups(dataset: &mut Dataset, results: &mut Results) -> Result<(), Problems> 
             }
         }
         if !nodes.is_empty() {
-            results.sets.entry(name.to_owned()).or_default().extend(nodes);
+            results.sets.entry(name.trim().to_owned()).or_default().extend(nodes);
         }
     }
     Ok(())
@@ -269,9 +284,10 @@ fn groups(dataset: &mut Dataset, results: &mut Results) -> Result<(), Problems> 
 
 /// Units code, description and the factors to SI, as text for the user.
 fn units(dataset: &mut Dataset) -> Option<String> {
-    let head = dataset.next()?.trim();
-    let factors = dataset.next().unwrap_or("").split_ascii_whitespace().take(3);
-    let factors = factors.collect::<Vec<_>>().join(", ");
+    let head = dataset.next()?;
+    let head = head.trim();
+    let factors = dataset.next().unwrap_or_default();
+    let factors = factors.split_ascii_whitespace().take(3).collect::<Vec<_>>().join(", ");
     Some(format!("{head}; SI divided into them (length, force, temperature): {factors}"))
 }
 
@@ -284,7 +300,7 @@ fn shapes(dataset: &mut Dataset, count: i64, seen: &mut u8) -> Result<Vec<NodeSh
         6 => 6,
         _ => return Err(dataset.wrong(allowed)),
     };
-    while dataset.at < dataset.lines.len() {
+    while !dataset.is_at_end() {
         let node = dataset.integers(1, "a node")?[0];
         let v = dataset.reals(count, seen)?;
         shape.push(NodeShape {
@@ -297,7 +313,7 @@ fn shapes(dataset: &mut Dataset, count: i64, seen: &mut u8) -> Result<Vec<NodeSh
 }
 
 fn mode_55(dataset: &mut Dataset, results: &mut Results, seen: &mut u8) -> Result<(), Problems> {
-    dataset.at = 5;
+    dataset.skip(5);
     let head = dataset.integers(6, "six numbers that define the data")?;
     let [_, analysis, _, result, data, values] = head[..6] else {
         return Err(dataset.wrong("six numbers"));
@@ -324,9 +340,9 @@ fn mode_2414(
     seen: &mut u8,
     solutions: &mut Vec<i64>,
 ) -> Result<(), Problems> {
-    dataset.at = 2;
+    dataset.skip(2);
     let location = dataset.integers(1, "the location of the data")?[0];
-    dataset.at = 8;
+    dataset.skip(5);
     let head = dataset.integers(6, "six numbers that define the data")?;
     let [_, analysis, _, result, data, values] = head[..6] else {
         return Err(dataset.wrong("six numbers"));
