@@ -32,6 +32,15 @@ pub struct Variant {
     pub follower_thrust: bool,
     /// Gimbal slope.
     pub slope: Slope,
+    /// Rigid translation and rotation free; off holds them at zero.
+    #[serde(default)]
+    pub rigid_body: bool,
+    /// Slosh masses free; off locks them to their tanks.
+    #[serde(default)]
+    pub slosh: bool,
+    /// Aerodynamic forces on.
+    #[serde(default)]
+    pub aerodynamics: bool,
 }
 
 /// A set of cases evaluated in one run; tables hold populations in this order.
@@ -69,6 +78,13 @@ pub struct Definition {
 }
 
 impl Definition {
+    /// Adds cases to the dispersed population and to every corner's Monte Carlo.
+    pub fn add_cases(&mut self, more: u64) {
+        for population in self.populations.iter_mut().filter(|p| p.drawn) {
+            population.cases = population.cases.saturating_add(more).min(MOST_CASES);
+        }
+    }
+
     /// Sets the number of cases of the dispersed population and of every corner's Monte Carlo.
     pub fn set_cases(&mut self, cases: u64) {
         for population in self.populations.iter_mut().filter(|p| p.drawn) {

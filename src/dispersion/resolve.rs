@@ -19,17 +19,19 @@ enum Level {
     Vehicle,
     Engine,
     Actuator,
+    Tank,
     Mode,
 }
 
 impl Level {
-    const ALL: [Self; 4] = [Self::Vehicle, Self::Engine, Self::Actuator, Self::Mode];
+    const ALL: [Self; 5] = [Self::Vehicle, Self::Engine, Self::Actuator, Self::Tank, Self::Mode];
 
     fn name(self) -> &'static str {
         match self {
             Self::Vehicle => "vehicle",
             Self::Engine => "engine",
             Self::Actuator => "actuator",
+            Self::Tank => "tank",
             Self::Mode => "mode",
         }
     }
@@ -40,6 +42,7 @@ impl Level {
             Self::Vehicle => true,
             Self::Engine => matches!(scope, Scope::Engine | Scope::Actuator | Scope::Gimbal),
             Self::Actuator => scope == Scope::Actuator,
+            Self::Tank => scope == Scope::Tank,
             Self::Mode => matches!(scope, Scope::Mode | Scope::Gimbal),
         }
     }
@@ -49,6 +52,7 @@ impl Level {
         match segment {
             "<group>" | "<engine>" => self != Self::Vehicle,
             "<actuator>" => self == Self::Actuator,
+            "<tank>" => self == Self::Tank,
             "<label>" => self == Self::Mode,
             _ => false,
         }
