@@ -111,7 +111,13 @@ impl Resolver<'_> {
             BodyKind::Integrated => file.body.engine.iter().map(|e| e.name.clone()).collect(),
         };
         Some(Made {
-            modal: Modal { source: source.to_owned(), contains_engines, sets, parents },
+            modal: Modal {
+                source: source.to_owned(),
+                contains_engines,
+                contains_tanks: file.body.contains_tanks.clone(),
+                sets,
+                parents,
+            },
             thresholds,
             times,
             roles: grids::roles(file),
@@ -141,6 +147,8 @@ impl Resolver<'_> {
             self.findings.push("body.engine", "none, with kind = \"integrated\"", allowed);
         }
         names::unique(self.findings, "body.engine", body.engine.iter().map(|e| e.name.as_str()));
+        let tanks = body.contains_tanks.iter().map(String::as_str);
+        names::unique(self.findings, "body.contains_tanks", tanks);
         for (i, engine) in body.engine.iter().enumerate() {
             let parts = engine.name.split_once('.');
             if !parts.is_some_and(|(group, name)| names::is_word(group) && names::is_word(name)) {
@@ -182,6 +190,16 @@ impl Resolver<'_> {
                     self.push(&format!("flight_time[{i}].mass_matrix"), found, allowed);
                 })
                 .ok()?;
+        }
+        for (name, nodes) in &self.file.set {
+            let mut nodes = nodes.clone();
+            nodes.sort_unstable();
+            nodes.dedup();
+            let known = results.sets.insert(name.clone(), nodes.clone());
+            if known.is_some_and(|known| known != nodes) {
+                let found = "other nodes than the set of this name in the files".to_owned();
+                self.push(&format!("set.{name}"), found, "another name");
+            }
         }
         let (program, modes) = (results.program.clone(), results.modes.len());
         let mut model = Model::new(results, units, frame)

@@ -6,6 +6,7 @@ use crate::import::UnitSystem;
 use crate::import::normalise::Normalisation;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// What `tvse import` is to make of the results of a finite element program.
 ///
@@ -32,6 +33,9 @@ pub struct ImportFile {
     /// Flight times with their results, ascending.
     #[schemars(length(min = 1))]
     pub flight_time: Vec<FlightTimeFile>,
+    /// Sets of node ids by name, beside those in the files.
+    #[serde(default)]
+    pub set: BTreeMap<String, Vec<i64>>,
     /// Grids of the package, one by one.
     #[serde(default)]
     pub grid: Vec<GridFile>,
@@ -64,6 +68,9 @@ pub struct BodyFile {
     /// that they are not in it.
     #[serde(default)]
     pub engine: Vec<BodyEngineFile>,
+    /// Tanks of the vehicle file whose slosh masses the modes contain, locked (default: none).
+    #[serde(default)]
+    pub contains_tanks: Vec<String>,
 }
 
 /// Whether the engines are in the modes.

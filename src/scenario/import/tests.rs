@@ -364,6 +364,23 @@ fn pounds_by_wtmass_are_the_same_modes_as_slinches() {
 }
 
 #[test]
+fn a_set_of_the_description_serves_as_one_of_the_files_and_does_not_replace_it() {
+    let with = |set: &str| {
+        description(&PLAIN).replace(
+            "[[grid]]\nname = \"rock\"",
+            &format!("[set]\n{set}\n\n[[grid]]\nname = \"rock\""),
+        )
+    };
+    let text =
+        with("aft = [2008, 2007, 2006, 2005, 2004, 2003, 2002, 2001]").replace("AFT RING", "aft");
+    let made = import(&text, vec![results(&PLAIN)]).unwrap();
+    assert_eq!(made.modal.sets, plain().modal.sets);
+    let text = with("\"AFT RING\" = [1, 2, 3]");
+    let problems = import(&text, vec![results(&PLAIN)]).unwrap_err().to_string();
+    assert!(problems.contains("set.AFT RING: found other nodes"), "{problems}");
+}
+
+#[test]
 fn the_wrong_unit_system_is_refused_with_the_one_that_fits() {
     let millimetres = Style { units: UnitSystem::MmTS, ..PLAIN };
     let text = description(&millimetres).replace("mm-t-s", "si");
