@@ -10,6 +10,9 @@ use crate::fem::{Precision, Results};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 
+/// Farthest position of a grid, m; no vehicle is so large in any unit, and squares do not overflow.
+const FARTHEST_M: f64 = 1e9;
+
 /// The vehicle's frame in the basic frame of the file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -140,8 +143,13 @@ impl Model {
             let node = &results.nodes[at];
             let Some(basic) = systems.position(node) else { continue };
             let Some(local) = systems.axes(node, &basic) else { continue };
+            let position_m = frame.place(basic * units.length_m);
+            if !(position_m.amax() <= FARTHEST_M) {
+                faults.push(format!("node {id} at a distance of {:.1e} m", position_m.amax()));
+                break;
+            }
             ids.push(id);
-            positions_m.push(frame.place(basic * units.length_m));
+            positions_m.push(position_m);
             axes.push(frame.axes.transpose() * local);
             kept.push(place);
         }

@@ -194,6 +194,13 @@ pub fn recognise(model: &Model) -> Result<RigidBody, Vec<String>> {
     }
     for mode in &body.modes {
         let over = mode.frequency_hz.abs() / first;
+        if !(over < 1.0) {
+            return Err(vec![format!(
+                "mode {} at {:.4} Hz, above the first elastic mode at {first:.4} Hz, that moves all \
+                 grids with results as one: results at too few grids",
+                mode.number, mode.frequency_hz
+            )]);
+        }
         if !(over <= POOR_FREQUENCY) {
             body.warnings.push(format!(
                 "rigid-body mode {} at {:.3e} Hz, {:.0} % of the first elastic mode at {first:.4} Hz",
@@ -240,6 +247,9 @@ pub fn mass_properties(
         p.set_column(column, &motion);
     }
     let flexibility = p * p.transpose();
+    if !flexibility.iter().all(|x| x.is_finite()) {
+        return Err("rigid-body modes that are not finite".to_owned());
+    }
     let eigen = flexibility.symmetric_eigenvalues();
     let inverse = flexibility.try_inverse().filter(|_| eigen.min() > LINE * eigen.max());
     let Some(mass) = inverse else {

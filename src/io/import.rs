@@ -58,14 +58,13 @@ pub struct Loaded {
 pub fn load(path: &Path, allowed: Allowed) -> Result<Loaded, Problems> {
     let name = files::name(path);
     let text = files::read_text(path)?;
-    let (raw, mut findings) = table::read::<ImportFile>(&name, &text)?;
+    let (raw, findings) = table::read::<ImportFile>(&name, &text)?;
     let mut source = Source {
         folder: path.parent().unwrap_or(Path::new("")),
         allowed,
         inputs: BTreeMap::from([("import.toml".to_owned(), files::digest_of(text.as_bytes()))]),
     };
-    let times = raw.flight_time.iter().enumerate();
-    let read = times.map(|(i, time)| source.time(i, time, &mut findings)).collect();
+    let read = |i: usize, findings: &mut Findings| source.time(i, &raw.flight_time[i], findings);
     let made = import::resolve(&raw, read, findings)?;
     Ok(Loaded { made, units: raw.units.word(), inputs: source.inputs })
 }

@@ -19,7 +19,7 @@ use crate::import::{Chosen, Frame, Model, Units};
 use crate::problem::Problems;
 use crate::structure::orientation::{self, Mass};
 use crate::structure::{Thresholds, label};
-use crate::vehicle::{MassProperties, Modal, Mode, ModeSet};
+use crate::vehicle::{Grid, MassProperties, Modal, Mode, ModeSet};
 use faer::Mat;
 use grids::Choice;
 use nalgebra::{Matrix3, Vector3};
@@ -29,6 +29,10 @@ use std::collections::BTreeSet;
 const SKEW: f64 = 1e-4;
 /// Departure of a declared mass from that of the files above which it is reported.
 const MASS_APART: f64 = 0.02;
+/// Agreement of the grids' masses with the body's above which they must weigh the modes too.
+const WHOLE_MASS: f64 = 0.02;
+/// Departure of a generalised mass on the grids from 1 that lumping explains.
+const LUMPING: f64 = 0.15;
 /// Least relative difference of frequencies under which modes count as repeated.
 const REPEATED: f64 = 1e-6;
 /// Modes beyond those asked for that may be repetitions of the last: those of a body of revolution
@@ -48,14 +52,14 @@ pub struct Read {
     pub matrix: Option<Vec<Entry>>,
 }
 
-/// Makes modal data of what `file` asks for and `read` holds, one entry for each of its flight
-/// times.
+/// Makes modal data of what `file` asks for; `read` reads one of its flight times, of which one at a
+/// time is held in memory, and tells the findings why it could not.
 ///
 /// # Errors
 /// All problems of the description, of the results, and of both together.
 pub fn resolve(
     file: &ImportFile,
-    read: Vec<Option<Read>>,
+    mut read: impl FnMut(usize, &mut Findings) -> Option<Read>,
     mut findings: Findings,
 ) -> Result<Made, Problems> {
     let mut resolver = Resolver {
@@ -65,7 +69,7 @@ pub fn resolve(
         warnings: Vec::new(),
         sections: Vec::new(),
     };
-    let made = resolver.resolve(read);
+    let made = resolver.resolve(&mut read);
     findings.finish(made)
 }
 
@@ -79,25 +83,38 @@ struct Resolver<'a> {
 }
 
 impl Resolver<'_> {
-    fn resolve(&mut self, read: Vec<Option<Read>>) -> Option<Made> {
+    fn resolve(
+        &mut self,
+        read: &mut dyn FnMut(usize, &mut Findings) -> Option<Read>,
+    ) -> Option<Made> {
         let file = self.file;
         let source = file.source.trim();
         if source.is_empty() || source.contains(char::is_control) {
             let found = format!("{:?}", file.source);
             self.findings.push("source", found, "a text on one line");
         }
-        let times: Vec<f64> = file.flight_time.iter().map(|t| t.time_s).collect();
-        names::ascending(self.findings, "flight_time.time_s", &times);
+        for (i, pair) in file.flight_time.windows(2).enumerate() {
+            if !(pair[0].time_s < pair[1].time_s) {
+                let found = format!("{} s after {} s", pair[1].time_s, pair[0].time_s);
+                let key = format!("flight_time[{}].time_s", i + 1);
+                self.findings.push(key, found, "ascending flight times");
+            }
+        }
         self.body();
         let names_hold = grids::check(file, self.findings);
         let units = file.units.units(file.wtmass).map_err(|(found, allowed)| {
             self.findings.push("wtmass", found, allowed);
         });
         let frame = self.frame(units.as_ref().ok());
-        let (units, frame) = (units.ok()?, frame?);
+        let (Ok(units), Some(frame)) = (units, frame) else {
+            // What is wrong with the files is told all the same.
+            (0..file.flight_time.len()).for_each(|i| drop(read(i, self.findings)));
+            return None;
+        };
         let mut made = Vec::new();
-        for (i, read) in read.into_iter().enumerate() {
-            let time = read.and_then(|read| self.time(i, read, &units, &frame, names_hold));
+        for i in 0..file.flight_time.len() {
+            let time = read(i, self.findings)
+                .and_then(|read| self.time(i, read, &units, &frame, names_hold));
             made.push(time);
         }
         let (mut sets, times): (Vec<ModeSet>, Vec<MadeTime>) =
@@ -251,7 +268,7 @@ impl Resolver<'_> {
         let body = self.mass(i, time, &estimates, by_modes.err());
         let (mut kept, asked) = self.keep(time.time_s, &model, &rigid)?;
         let (choices, body) = (choices?, body?);
-        let grids: Vec<_> = grids::package_grids(&choices, &model);
+        let mut grids: Vec<_> = grids::package_grids(&choices, &model);
         let mut shapes: Vec<Mode> = (kept.iter())
             .map(|&place| {
                 let mode = &model.modes[place];
@@ -272,6 +289,22 @@ impl Resolver<'_> {
         orient(&mut shapes, &positions, apart);
         shapes.truncate(asked);
         kept.truncate(asked);
+        if !shapes.iter().all(is_finite) {
+            let found = "modes that are not finite once normalised".to_owned();
+            self.push(&key, found, "numbers of the size of a vehicle");
+            return None;
+        }
+        if masses_contradict(&grids, &body, &shapes) {
+            self.warn(
+                time.time_s,
+                "the lumped masses of the chosen nodes are the whole mass, and yet give some modes a \
+                 generalised mass far from 1: they are left out of the package"
+                    .to_owned(),
+            );
+            for grid in &mut grids {
+                (grid.mass_kg, grid.inertia_kg_m2) = (Vector3::zeros(), Vector3::zeros());
+            }
+        }
         self.quality(time.time_s, &model, &generalised, &kept, &choices, &shapes);
         let chosen = choices.iter().map(|c| Chosen { grid: c.name.clone(), from: c.from.clone() });
         let made = MadeTime {
@@ -525,6 +558,27 @@ impl Resolver<'_> {
             }
         }
     }
+}
+
+fn is_finite(mode: &Mode) -> bool {
+    mode.shape.iter().chain(&mode.slope).flat_map(|v| v.iter()).all(|x| x.is_finite())
+}
+
+/// Whether the masses of the grids are those of the whole body and still do not give every mode its
+/// unit generalised mass, as where sections of many nodes do not move as one. A package of such
+/// masses is refused by its reader, whose bounds these are.
+fn masses_contradict(grids: &[Grid], body: &MassProperties, modes: &[Mode]) -> bool {
+    let total: f64 = grids.iter().map(|g| g.mass_kg.x).sum();
+    let generalised = |mode: &Mode| -> f64 {
+        (grids.iter().zip(mode.shape.iter().zip(&mode.slope)))
+            .map(|(g, (phi, psi))| {
+                g.mass_kg.dot(&phi.component_mul(phi))
+                    + g.inertia_kg_m2.dot(&psi.component_mul(psi))
+            })
+            .sum()
+    };
+    (total / body.mass_kg - 1.0).abs() <= WHOLE_MASS
+        && !modes.iter().all(|mode| (generalised(mode) - 1.0).abs() <= LUMPING)
 }
 
 /// Orients repeated modes and fixes signs on the grids of the package, each weighing the same.

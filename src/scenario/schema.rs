@@ -121,6 +121,7 @@ mod tests {
         assert_agreement::<VehicleFile>(fixture::VEHICLE);
         assert_agreement::<RunFile>(include_str!("../../runs/reference.toml"));
         assert_agreement::<Table>(include_str!("../../dispersions/reference.toml"));
+        assert_agreement::<ImportFile>(include_str!("../../docs/import/calculix/import.toml"));
         assert_agreement::<Stick>(include_str!("../../vehicles/sls-like/stick.toml"));
     }
 

@@ -284,8 +284,10 @@ fn a_real_free_free_set_of_278_modes_becomes_a_package_and_runs_a_campaign() {
     assert!(imported.out.contains("6 rigid-body modes"), "{}", imported.out);
     let modal = package::read(&folder.join("modes")).unwrap();
     let set = &modal.sets[0];
-    for (mode, printed) in set.modes.iter().zip([10.674, 11.105, 11.672, 21.486]) {
-        assert!((mode.frequency_hz - printed).abs() < 1e-3, "{}", mode.frequency_hz);
+    for (mode, known) in set.modes.iter().zip([10.674, 11.105, 11.672, 21.486]) {
+        // Known are circular frequencies, to three decimals.
+        let found = std::f64::consts::TAU * mode.frequency_hz;
+        assert!((found - known).abs() < 6e-4, "{found}");
     }
     // Printed by the grid point weight generator of the run: 3.345436 kg, cg at 633.3702 mm.
     // Six shapes in single precision over 2 m of grids give it to about 1e-6.
@@ -305,7 +307,7 @@ fn a_real_free_free_set_of_278_modes_becomes_a_package_and_runs_a_campaign() {
         table.texts["status"]
     );
     let hz = table.numbers["frequency_hz"].iter().flatten();
-    assert!(hz.clone().all(|f| (5.0..12.0).contains(f)), "{:?}", hz.collect::<Vec<_>>());
+    assert!(hz.clone().all(|f| (1.0..2.5).contains(f)), "{:?}", hz.collect::<Vec<_>>());
 }
 
 /// Free-free modes of unit length and mean square: squared wave numbers, φ(0) = 2, φ'(0).
@@ -361,7 +363,7 @@ fn a_solid_beam_by_calculix_has_the_modes_slopes_and_jet_damping_of_its_beam() {
             assert!((displacement.abs() / 2.0 - 1.0).abs() < softer, "mode {j}: {displacement}");
             // Rotation about z is +dv/dx, about y it is −dw/dx.
             let turn = mode.slope[end][3 - axis] * if axis == 1 { 1.0 } else { -1.0 };
-            let slope = turn * mass.sqrt() * length / (displacement / 2.0);
+            let slope = turn * mass.sqrt() * length / displacement;
             // The section turns less than the axis by the shear angle, none at the free end.
             assert!(
                 (slope / (slope_sign * end_slope) - 1.0).abs() < 1.5 * softer,

@@ -56,10 +56,13 @@ fn nodes() -> Vec<(i64, Vector3<f64>)> {
     nodes
 }
 
+/// Translation and rotation at a point.
+type Motion = dyn Fn(&Vector3<f64>) -> (Vector3<f64>, Vector3<f64>);
+
 /// A mode of the body: frequency, translation and rotation at a point, unit generalised mass.
 struct Physical {
     frequency_hz: f64,
-    motion: Box<dyn Fn(&Vector3<f64>) -> (Vector3<f64>, Vector3<f64>)>,
+    motion: Box<Motion>,
 }
 
 /// Six mixed rigid motions, then three pairs of bending modes, each pair turned by some angle.
@@ -269,8 +272,8 @@ radius_m = [1.0, 1.6]
 
 fn import(text: &str, read: Vec<Results>) -> Result<Made, Problems> {
     let (raw, findings) = table::read::<ImportFile>("import.toml", text)?;
-    let read = read.into_iter().map(|results| Some(Read { results, matrix: None })).collect();
-    resolve(&raw, read, findings)
+    let mut read = read.into_iter();
+    resolve(&raw, |_, _| Some(Read { results: read.next()?, matrix: None }), findings)
 }
 
 fn plain() -> Made {
@@ -418,8 +421,8 @@ fn modes_without_masses_are_normalised_by_a_mass_matrix_or_refused() {
     )
     .unwrap();
     let shapes = bare.modes.clone();
-    let made =
-        resolve(&raw, vec![Some(Read { results: bare, matrix: Some(entries) })], findings).unwrap();
+    let mut read = Some(Read { results: bare, matrix: Some(entries) });
+    let made = resolve(&raw, |_, _| read.take(), findings).unwrap();
     let sum: f64 = (shapes[6].shape.iter().filter(|s| s.node < GIMBAL))
         .map(|s| 2.5 * s.translation.iter().map(|t| t * t).sum::<f64>())
         .sum();
@@ -599,7 +602,7 @@ radius_m = [2, 1]
         problems.0.iter().map(|p| (p.key.as_str(), p.found.as_str())).collect();
     for key in [
         "source",
-        "flight_time.time_s[1]",
+        "flight_time[1].time_s",
         "body.engine",
         "grid[0].name",
         "grid[0]",
@@ -672,4 +675,69 @@ fn no_modes_below_the_greatest_frequency_is_a_problem_of_that_key() {
     assert_eq!(set.modes.len(), 3);
     let gimbal = set.modes[2].shape[set.grid("gimbal").unwrap()];
     assert!(gimbal.z.abs() < 1e-10 * gimbal.y.abs(), "{gimbal}");
+}
+
+#[test]
+fn masses_that_would_contradict_their_modes_stay_out_of_the_package() {
+    // The whole mass on two rings of the centreline's 21: the modes do not weigh 1 on them.
+    let mut results = results(&PLAIN);
+    let mass =
+        (1..=8).chain(2001..=2008).map(|id| (id, NodeMass { mass: 375.0, inertia: [0.0; 3] }));
+    results.mass = Some(mass.collect());
+    let made = import(&description(&PLAIN), vec![results]).unwrap();
+    assert!(made.warnings.iter().any(|w| w.contains("left out of the package")));
+    assert!(made.modal.sets[0].grids.iter().all(|g| g.mass_kg.x == 0.0));
+}
+
+#[test]
+fn an_elastic_mode_that_looks_rigid_on_its_grids_is_refused() {
+    let mut results = results(&PLAIN);
+    results.modes[2].frequency_hz = 30.0;
+    let problems = refused("a tube", "a tube", results);
+    assert!(problems.contains("moves all grids with results as one"), "{problems}");
+}
+
+#[test]
+fn positions_beyond_any_vehicle_are_refused_before_they_overflow() {
+    let mut results = results(&PLAIN);
+    results.nodes[3].position = [1e200, 0.0, 0.0];
+    let problems = refused("a tube", "a tube", results);
+    assert!(problems.contains("node 4 at a distance"), "{problems}");
+    let mut results = self::results(&PLAIN);
+    results.modes.iter_mut().for_each(|m| {
+        m.shape.iter_mut().for_each(|s| s.translation = s.translation.map(|t| 1e200 * t));
+    });
+    assert!(!refused("a tube", "a tube", results).is_empty());
+}
+
+#[test]
+fn the_description_in_the_documentation_is_one() {
+    let page = include_str!("../../../docs/import/README.md");
+    let text = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
+    let (raw, mut findings) = table::read::<ImportFile>("README.md", text).unwrap();
+    assert!(grids::check(&raw, &mut findings));
+    let raw = findings.finish(Some(raw)).unwrap();
+    assert_eq!((raw.grid.len(), raw.centreline.len(), raw.set.len()), (2, 1, 1));
+}
+
+proptest::proptest! {
+    #[test]
+    fn no_value_of_a_description_makes_the_import_panic(
+        line in 1_usize..40,
+        junk in proptest::sample::select(vec![
+            "0", "-1", "1e300", "1e-300", "\"\"", "[]", "{}", "true", "[0, 0, 0]", "\"x\"", "[1, 2]",
+        ]),
+    ) {
+        let text = description(&PLAIN);
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        if let Some(line) = lines.get_mut(line)
+            && let Some((key, _)) = line.clone().split_once(" = ")
+        {
+            *line = format!("{key} = {junk}");
+        }
+        if let Ok((raw, findings)) = table::read::<ImportFile>("import.toml", &lines.join("\n")) {
+            let read = |_: usize, _: &mut Findings| Some(Read { results: results(&PLAIN), matrix: None });
+            let _ = resolve(&raw, read, findings);
+        }
+    }
 }
