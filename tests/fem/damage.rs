@@ -28,10 +28,11 @@ const FILES: [&str; 17] = [
 ];
 
 /// Most memory for a file: text grows by the fields of its lines; deflated tables by 1032 as zlib
-/// documents, each once compressed, once as table and once as shapes.
+/// documents, each once compressed, once as table and once as shapes. The HDF5 crate reserves for
+/// the entries of a node at once, of which a 16-bit count tells up to 65535 (5.5 MB).
 fn bound(bytes: &[u8]) -> usize {
     let hdf5 = bytes.starts_with(b"\x89HDF");
-    if hdf5 { (4 << 20) + 3 * 1032 * bytes.len() } else { (1 << 20) + 64 * bytes.len() }
+    if hdf5 { (16 << 20) + 3 * 1032 * bytes.len() } else { (1 << 20) + 64 * bytes.len() }
 }
 
 /// Reads and, if that succeeds, uses what was read.
