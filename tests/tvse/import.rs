@@ -48,11 +48,11 @@ fn a_stick_model_that_comes_back_by_tables_gives_the_same_campaign() {
     // The campaign's flight time alone, so that labels are in order of frequency on both sides.
     let mut one = Modal { parents: Vec::new(), ..original };
     one.sets.retain(|set| set.flight_time_s == 110.0);
+    let named = one.sets[0].mode("m006").unwrap();
     for (i, mode) in one.sets[0].modes.iter_mut().enumerate() {
         mode.label = format!("m{:03}", i + 1);
     }
-    let tvse = one.sets[0].modes.iter().find(|m| (m.frequency_hz - 5.4977).abs() < 1e-3).unwrap();
-    let label = tvse.label.clone();
+    let label = one.sets[0].modes[named].label.clone();
     let dir = study.path("vehicles/sls-like/modes");
     let thresholds = tvse::structure::Thresholds::default();
     package::write(&dir, &one, &thresholds, true).unwrap();
