@@ -6,6 +6,7 @@ mod fault;
 pub mod files;
 pub mod flat;
 pub mod folder;
+pub mod import;
 pub mod inputs;
 pub mod lock;
 pub mod maker;
