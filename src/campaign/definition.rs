@@ -1,6 +1,8 @@
 //! What a campaign is asked to do: cases, seed, flight times, variants and modes of interest.
 
+use crate::dispersion::Scheme;
 pub use crate::dynamics::NozzleJet;
+use crate::stats::Drawing;
 
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +47,16 @@ pub struct Population {
     pub fixed: Vec<(usize, f64)>,
     /// Whether the keys that are not fixed are drawn; if not they stay nominal.
     pub drawn: bool,
+    /// How its cases come about, where they are drawn: independently unless said otherwise.
+    #[serde(default, skip_serializing_if = "Scheme::is_monte_carlo")]
+    pub scheme: Scheme,
+}
+
+impl Population {
+    /// What may be concluded from its cases.
+    pub fn drawing(&self) -> Drawing {
+        if self.drawn { self.scheme.drawing() } else { Drawing::Designed }
+    }
 }
 
 /// A run definition, validated against its vehicle and dispersion.
@@ -69,9 +81,11 @@ pub struct Definition {
 }
 
 impl Definition {
-    /// Sets the number of cases of the dispersed population and of every corner's Monte Carlo.
+    /// Sets the number of cases of the dispersed population and of every corner's Monte Carlo;
+    /// designs keep their own number.
     pub fn set_cases(&mut self, cases: u64) {
-        for population in self.populations.iter_mut().filter(|p| p.drawn) {
+        let free = |p: &&mut Population| p.drawn && !p.scheme.has_own_cases();
+        for population in self.populations.iter_mut().filter(free) {
             population.cases = cases;
         }
     }

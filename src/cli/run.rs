@@ -5,7 +5,6 @@ use super::{Error, PASS, gate, progress};
 use crate::campaign::definition::MOST_CASES;
 use crate::campaign::evaluator::Evaluator;
 use crate::campaign::{Outline, Pool, Progress, StoredPoles, corner, outline::DrawColumn, pool};
-use crate::dispersion::Sampler;
 use crate::io::inputs::Inputs;
 use crate::io::{self, Results};
 use crate::problem::Problems;
@@ -71,6 +70,10 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     io::files::refuse_existing(&folder)?;
     let definition = &mut loaded.definition;
     if let Some(cases) = args.cases {
+        if let Some(p) = definition.populations.iter().find(|p| p.scheme.has_own_cases()) {
+            let message = format!("--cases: the plan ({}) has its own number", p.scheme.describe());
+            return Err(Error::Usage(message));
+        }
         definition.set_cases(cases);
     }
     if let Some(seed) = args.seed {
@@ -92,9 +95,9 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     if let Some(gates) = &args.gates {
         gate::rules(gates, &outline)?;
     }
+    let sampler = loaded.sampler(&loaded.definition)?;
     let mut results = Results::create(&folder, outline)?;
     inputs.write(&folder)?;
-    let sampler = Sampler::new(&loaded.dispersion, loaded.definition.seed);
     let all = poles == StoredPoles::All;
     let evaluator = Evaluator::new(vehicle, &sampler, &loaded.definition, all)
         .map_err(|error| unprepared(&args.run, &error))?;

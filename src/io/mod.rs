@@ -5,6 +5,7 @@ pub mod files;
 pub mod flat;
 pub mod folder;
 pub mod inputs;
+pub mod listed;
 pub mod manifest;
 pub mod package;
 pub mod plan;

@@ -6,6 +6,7 @@ mod fixture;
 pub mod gimbal;
 pub mod names;
 pub mod pattern;
+pub mod plan;
 pub mod run;
 pub mod run_file;
 pub mod schema;

@@ -13,6 +13,10 @@ pub enum Drawing {
     LatinHypercube,
     /// A low-discrepancy sequence.
     LowDiscrepancy,
+    /// Inner campaigns that share their outer draws.
+    Nested,
+    /// Crossings of two samples, for sensitivity indices.
+    Crossed,
     /// Chosen points: a nominal, corners, one at a time, a list from a file.
     Designed,
     /// Kept or found because of their result: search results, cases added because they were bad.
@@ -34,6 +38,8 @@ impl Drawing {
             Self::Independent => "independent draws",
             Self::LatinHypercube => "a Latin hypercube",
             Self::LowDiscrepancy => "a low-discrepancy sequence",
+            Self::Nested => "inner campaigns that share their outer draws",
+            Self::Crossed => "crossings of two samples, which share their draws",
             Self::Designed => "chosen points, not draws",
             Self::Selected => "selected by their result",
         }
