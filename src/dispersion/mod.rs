@@ -8,6 +8,7 @@
 mod beta;
 pub mod correlation;
 pub mod draw;
+pub mod factorial;
 #[cfg(test)]
 pub(crate) mod fixture;
 pub mod keyed;
@@ -17,7 +18,9 @@ pub mod parameter;
 pub mod plan;
 pub mod resolve;
 pub mod sampler;
+pub mod scheme;
 pub mod sobol;
+pub mod strata;
 pub mod stream;
 pub mod table;
 
@@ -25,7 +28,8 @@ pub use correlation::Group;
 pub use draw::{Dispersion, Draw, Role, Shared};
 pub use law::{Bound, Law, Position};
 pub use parameter::{Affine, Parameters, Place, Quantity};
-pub use plan::{Levels, Listed, Plan, Refusal, Scheme};
+pub use plan::{Listed, Plan};
 pub use resolve::resolve;
 pub use sampler::{Cursor, Draws, Sampler};
+pub use scheme::{Levels, Refusal, Scheme};
 pub use table::{Apply, Class, Table};

@@ -6,7 +6,8 @@
 use super::draw::{Dispersion, Role};
 use super::law::Position;
 use super::parameter::Affine;
-use super::plan::{Design, Listed, Plan, Refusal, Scheme};
+use super::plan::{Design, Listed, Plan};
+use super::scheme::{Refusal, Scheme};
 
 /// The draws of one case, in the order of [`Dispersion::draws`].
 #[derive(Debug, Clone, PartialEq)]

@@ -47,8 +47,8 @@ impl Directions {
             let degree = degrees.next().expect("as many degrees as dimensions");
             let polynomial = bits(degree - 1);
             let mut v = [0_u64; 64];
-            for i in 0..degree {
-                v[i] = (bits(i) << 1 | 1) << (63 - i);
+            for (i, v) in v.iter_mut().enumerate().take(degree) {
+                *v = (bits(i) << 1 | 1) << (63 - i);
             }
             for k in degree..64 {
                 v[k] = v[k - degree] ^ (v[k - degree] >> degree);

@@ -6,7 +6,7 @@ use super::run::{has_worst, matching};
 use super::run_file::{KnownFile, PlanFile, RunFile};
 use super::table::Findings;
 use crate::campaign::definition::MOST_CASES;
-use crate::dispersion::plan::generators;
+use crate::dispersion::factorial::generators;
 use crate::dispersion::{Dispersion, Draw, Levels, Listed, Role, Scheme};
 use crate::stats::{self, Confidence, Probability, Tails};
 

@@ -1,6 +1,8 @@
 //! Plans give what their names promise, case by case, whatever was asked before.
 
+use super::super::factorial::generators;
 use super::super::fixture::vehicle;
+use super::super::strata::inside;
 use super::super::{Sampler, Table, resolve};
 use super::*;
 
