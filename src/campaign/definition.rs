@@ -53,6 +53,20 @@ pub struct Population {
 }
 
 impl Population {
+    /// The outer draw to which a case of a nested plan belongs.
+    pub fn outer(&self, case: u64) -> Option<u64> {
+        match self.scheme {
+            Scheme::Nested { inner, .. } => case.checked_div(inner),
+            _ => None,
+        }
+    }
+
+    /// The replicate to which a case belongs, where the plan has several.
+    pub fn replicate(&self, case: u64) -> Option<u64> {
+        let replicates = self.scheme.replicates();
+        (self.drawn && replicates > 1).then(|| case % replicates)
+    }
+
     /// What may be concluded from its cases.
     pub fn drawing(&self) -> Drawing {
         if self.drawn { self.scheme.drawing() } else { Drawing::Designed }

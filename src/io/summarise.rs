@@ -6,7 +6,9 @@
 use super::run::Run;
 use super::schema::TableName;
 use crate::campaign::metric::{self, Metric, Quantity, metrics};
-use crate::campaign::summary::{Group, Series, SummaryRow, WorstRow, groups, smallest, summarise};
+use crate::campaign::summary::{
+    Group, Sample, Series, SummaryRow, WorstRow, groups, smallest, summarise, summarise_nested,
+};
 use crate::problem::Problems;
 use std::collections::BTreeMap;
 
@@ -21,6 +23,7 @@ pub fn summary(run: &Run, memory: usize) -> Result<Vec<SummaryRow>, Problems> {
     let definition = &run.outline().definition;
     let mut rows = Vec::new();
     for (population, p) in definition.populations.iter().enumerate() {
+        let mut outer = Vec::new();
         let mut done: BTreeMap<(Option<usize>, usize), Vec<SummaryRow>> = BTreeMap::new();
         let modes = 0..definition.modes.len();
         let times = 0..definition.flight_times_s.len();
@@ -31,7 +34,8 @@ pub fn summary(run: &Run, memory: usize) -> Result<Vec<SummaryRow>, Problems> {
         for pairs in pairs.chunks(at_once) {
             for ((time, mode), variants) in at_times(run, population, pairs)? {
                 let rows = variants.iter().enumerate().map(|(variant, series)| {
-                    let group = Group { population, variant, mode, flight_time: Some(time) };
+                    let group =
+                        Group { population, variant, mode, flight_time: Some(time), outer: None };
                     sum_up(run, group, series)
                 });
                 done.insert((Some(time), mode), rows.collect::<Result<_, _>>()?);
@@ -39,16 +43,22 @@ pub fn summary(run: &Run, memory: usize) -> Result<Vec<SummaryRow>, Problems> {
         }
         for mode in modes {
             // One variant at a time: the gains are stored.
-            let reduced = (0..definition.variants.len()).map(|variant| {
-                let group = Group { population, variant, mode, flight_time: None };
-                sum_up(run, group, &reduced(run, group)?)
-            });
-            done.insert((None, mode), reduced.collect::<Result<_, _>>()?);
+            let mut variants = Vec::new();
+            for variant in 0..definition.variants.len() {
+                let group = Group { population, variant, mode, flight_time: None, outer: None };
+                let mut of_group = summarise_nested(group, p, &reduced(run, group)?)
+                    .map_err(|error| damaged(run, &error))?;
+                outer.extend(of_group.drain(1..));
+                variants.extend(of_group);
+            }
+            done.insert((None, mode), variants);
         }
         rows.extend(groups(definition, population).iter().map(|group| {
             let variants = &done[&(group.flight_time, group.mode)];
             variants[group.variant].clone()
         }));
+        outer.sort_by_key(|row: &SummaryRow| row.group);
+        rows.extend(outer);
     }
     Ok(rows)
 }
@@ -108,9 +118,12 @@ fn column(
 }
 
 fn sum_up(run: &Run, group: Group, series: &Series) -> Result<SummaryRow, Problems> {
-    let drawn = run.outline().definition.populations[group.population].drawn;
-    summarise(group, drawn, series)
-        .map_err(|error| run.damage(TableName::Modes, error.to_string(), "finite numbers"))
+    let sample = Sample::of(&run.outline().definition.populations[group.population]);
+    summarise(group, sample, series).map_err(|error| damaged(run, &error))
+}
+
+fn damaged(run: &Run, error: &crate::stats::Error) -> Problems {
+    run.damage(TableName::Modes, error.to_string(), "finite numbers")
 }
 
 /// The `most` worst cases of every population, variant and named mode, each with all its draws,
@@ -126,7 +139,7 @@ pub fn worst(run: &Run, most: usize) -> Result<Vec<WorstRow>, Problems> {
         let first = rows.len();
         for variant in 0..definition.variants.len() {
             for mode in 0..definition.modes.len() {
-                let group = Group { population, variant, mode, flight_time: None };
+                let group = Group { population, variant, mode, flight_time: None, outer: None };
                 let column = |quantity| column(run, &metrics, group, quantity);
                 let damping = column(Quantity::DampingRatioMin)?;
                 let cases = smallest(&damping, most);

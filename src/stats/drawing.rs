@@ -32,6 +32,20 @@ impl Drawing {
         }
     }
 
+    /// The witness that `replicates` replicates of the design, or outer draws, are independent of each
+    /// other; an error where there are not two or the design has none.
+    pub fn independent_replicates(self, replicates: u64) -> Result<Independent, Error> {
+        match self {
+            Self::LatinHypercube | Self::LowDiscrepancy | Self::Nested if replicates < 2 => {
+                Err(Error::TooFew { found: replicates, needed: 2 })
+            }
+            Self::Independent | Self::LatinHypercube | Self::LowDiscrepancy | Self::Nested => {
+                Ok(Independent(()))
+            }
+            drawing => Err(Error::NotIndependent { drawing }),
+        }
+    }
+
     /// The words that complete "these cases are …".
     pub fn describe(self) -> &'static str {
         match self {
@@ -46,7 +60,7 @@ impl Drawing {
     }
 }
 
-/// Witness that the cases of a sample are independent draws; made by [`Drawing::independent`] only.
+/// Witness that the cases of a sample are independent draws; made by [`Drawing`] only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Independent(());
 

@@ -36,6 +36,8 @@ pub enum Method {
     StudentT,
     /// Distribution-free interval between order statistics.
     OrderStatistics,
+    /// Student's t interval over independent replicates.
+    Replicates,
     /// Percentile bootstrap.
     BootstrapPercentile,
     /// Bias-corrected and accelerated bootstrap.
@@ -49,6 +51,7 @@ impl Method {
             Self::ClopperPearson => "clopper_pearson",
             Self::StudentT => "student_t",
             Self::OrderStatistics => "order_statistics",
+            Self::Replicates => "replicates",
             Self::BootstrapPercentile => "bootstrap_percentile",
             Self::BootstrapBca => "bootstrap_bca",
         }

@@ -15,6 +15,7 @@ mod paired;
 mod probability;
 mod proportion;
 mod quantile;
+mod replicates;
 mod root;
 mod student;
 mod tolerance;
@@ -29,6 +30,7 @@ pub use paired::PairedDifference;
 pub use probability::{Confidence, Probability};
 pub use proportion::{clopper_pearson, rejects_at_least, rejects_at_most};
 pub use quantile::Ordered;
+pub use replicates::of_replicates;
 pub use tolerance::{
     Tails, ToleranceBound, ToleranceInterval, consumers_risk, least_cases, most_exceedances,
     tolerance_bound, tolerance_interval,
