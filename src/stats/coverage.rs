@@ -154,13 +154,16 @@ fn intervals_from_replicates_cover_about_as_often_as_they_say() {
     let mut misses = [0; 2];
     let share = 0.3 * (1.0 - 0.3_f64.ln());
     for _ in 0..trials {
-        let mut values = [[0.0; 10]; 2];
-        for replicate in 0..10 {
+        let mut values = [vec![], vec![]];
+        for _ in 0..10 {
+            let (mut mean, mut bad) = (0.0, 0.0);
             for stratum in 0..16 {
                 let u = (f64::from(stratum) + uniform()) / 16.0;
-                values[0][replicate] += u.ln() / 16.0;
-                values[1][replicate] += if u * uniform() < 0.3 { 1.0 / 16.0 } else { 0.0 };
+                mean += u.ln() / 16.0;
+                bad += if u * uniform() < 0.3 { 1.0 / 16.0 } else { 0.0 };
             }
+            values[0].push(mean);
+            values[1].push(bad);
         }
         for ((values, truth), misses) in values.iter().zip([-1.0, share]).zip(&mut misses) {
             // All replicates alike gives no interval: it cannot miss.

@@ -34,6 +34,8 @@ pub enum Method {
     ClopperPearson,
     /// Student's t interval of a mean.
     StudentT,
+    /// Fisher's transformation of a correlation.
+    Fisher,
     /// Distribution-free interval between order statistics.
     OrderStatistics,
     /// Student's t interval over independent replicates.
@@ -50,6 +52,7 @@ impl Method {
         match self {
             Self::ClopperPearson => "clopper_pearson",
             Self::StudentT => "student_t",
+            Self::Fisher => "fisher",
             Self::OrderStatistics => "order_statistics",
             Self::Replicates => "replicates",
             Self::BootstrapPercentile => "bootstrap_percentile",

@@ -17,6 +17,7 @@ mod proportion;
 mod quantile;
 mod replicates;
 mod root;
+pub mod sensitivity;
 mod student;
 mod tolerance;
 
