@@ -3,18 +3,15 @@
 //!
 //! Works on series with one number per case; where they are read from is decided in `io`.
 
-use super::definition::Definition;
-use super::definition::Population;
+use super::definition::{Definition, Population};
+use super::sample::{CONFIDENCE, Intervals, Sample, ends, known};
 use crate::dispersion::Scheme;
 use crate::stats::{
-    Confidence, Drawing, Error, Estimate, Independent, Moments, Ordered, Probability, Sides,
-    clopper_pearson, of_replicates, rejects_at_least, rejects_at_most,
+    Confidence, Drawing, Error, Moments, Ordered, Probability, Sides, clopper_pearson,
+    of_replicates, rejects_at_least, rejects_at_most,
 };
 use std::f64::consts::LN_2;
 use std::ops::Range;
-
-/// Confidence of the intervals of the summary.
-pub const CONFIDENCE: f64 = 0.95;
 
 /// Levels of the quantiles of the damping ratio and the words for them in column names, in percent;
 /// 0.135 % and 99.865 % lie three standard deviations from the mean of a normal law.
@@ -151,31 +148,6 @@ pub struct SummaryRow {
     pub statement: Option<Statement>,
 }
 
-/// Where the intervals of a row come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Intervals {
-    /// Independent cases: exact binomial, Student's t, order statistics.
-    Independent,
-    /// Independent replicates of a design, or outer draws: Student's t over their results.
-    Replicates,
-    /// None follows from the cases.
-    None,
-}
-
-impl Intervals {
-    /// Every one, in the order of declaration.
-    pub const ALL: [Self; 3] = [Self::Independent, Self::Replicates, Self::None];
-
-    /// The word stored in the `intervals` column.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Independent => "independent_cases",
-            Self::Replicates => "replicates",
-            Self::None => "none",
-        }
-    }
-}
-
 /// Whether an outer draw meets the statement of its plan: that the share of unstable or failed
 /// inner cases is at most the allowed one, at the consumer's risk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -213,88 +185,6 @@ pub struct OuterDraws {
     pub share_met: f64,
     /// Its exact binomial interval: outer draws are independent.
     pub share_met_interval: [f64; 2],
-}
-
-/// How cases came about, as far as intervals need it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
-    drawing: Drawing,
-    clusters: Clusters,
-}
-
-/// Which cases belong to a replicate, or to an outer draw.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Clusters {
-    /// Cases take turns among so many replicates.
-    Turns(usize),
-    /// So many cases in a row.
-    Rows(usize),
-}
-
-impl Sample {
-    /// Independent cases.
-    pub const INDEPENDENT: Self =
-        Self { drawing: Drawing::Independent, clusters: Clusters::Turns(1) };
-
-    /// The cases of a population.
-    pub fn of(population: &Population) -> Self {
-        let clusters = match population.scheme {
-            Scheme::Nested { inner, .. } => Clusters::Rows(inner as usize),
-            ref scheme => Clusters::Turns(scheme.replicates() as usize),
-        };
-        Self { drawing: population.drawing(), clusters }
-    }
-
-    /// Number of replicates or outer draws.
-    fn replicates(&self, cases: usize) -> usize {
-        match self.clusters {
-            Clusters::Turns(count) => count,
-            Clusters::Rows(length) => cases / length.max(1),
-        }
-    }
-
-    /// The values of each replicate or outer draw; NaN is no value.
-    fn split(&self, values: &[f64]) -> Vec<Vec<f64>> {
-        match self.clusters {
-            Clusters::Turns(count) => (0..count)
-                .map(|turn| known(values.iter().skip(turn).step_by(count.max(1))))
-                .collect(),
-            Clusters::Rows(length) => values.chunks(length.max(1)).map(known).collect(),
-        }
-    }
-
-    /// The interval of a statistic: `exact` for independent cases, else from its replicates.
-    fn interval(
-        &self,
-        values: &[f64],
-        exact: impl Fn(Independent) -> Option<[f64; 2]>,
-        statistic: impl Fn(&[f64]) -> Option<f64>,
-    ) -> Option<[f64; 2]> {
-        if let Ok(independent) = self.drawing.independent() {
-            return exact(independent);
-        }
-        let replicates = self.replicates(values.len());
-        let independent = self.drawing.independent_replicates(replicates as u64).ok()?;
-        let of_each: Option<Vec<f64>> = self.split(values).iter().map(|v| statistic(v)).collect();
-        let confidence = Confidence::new(CONFIDENCE).ok()?;
-        of_replicates(&of_each?, confidence, independent).ok().map(ends)
-    }
-
-    /// Where intervals come from, of so many cases.
-    fn intervals(&self, cases: usize) -> Intervals {
-        let replicates = self.replicates(cases) as u64;
-        if self.drawing.independent().is_ok() {
-            Intervals::Independent
-        } else if self.drawing.independent_replicates(replicates).is_ok() {
-            Intervals::Replicates
-        } else {
-            Intervals::None
-        }
-    }
-}
-
-fn ends(estimate: Estimate) -> [f64; 2] {
-    [estimate.lower(), estimate.upper()]
 }
 
 /// Sums up one group of cases that came about as `sample` says.
@@ -384,10 +274,6 @@ pub fn summarise_nested(
     Ok(rows)
 }
 
-fn known<'a>(values: impl IntoIterator<Item = &'a f64>) -> Vec<f64> {
-    values.into_iter().copied().filter(|value| !value.is_nan()).collect()
-}
-
 fn mean_of(values: &[f64]) -> Option<f64> {
     Moments::of(values).ok()?.mean()
 }
@@ -410,7 +296,7 @@ fn quantile_intervals(
 ) -> Result<[Option<[f64; 2]>; LEVELS.len()], Error> {
     let mut intervals = [None; LEVELS.len()];
     let confidence = Confidence::new(CONFIDENCE)?;
-    if let Ok(independent) = sample.drawing.independent() {
+    if let Ok(independent) = sample.drawing().independent() {
         // Failed cases may lie anywhere: beyond every value for the end on either side.
         let failed = values.len() - ordered.len();
         let with = |value: f64| {
@@ -425,9 +311,9 @@ fn quantile_intervals(
             };
             *interval = Some([of(&low).lower(), of(&high).upper()]);
         }
-    } else if sample.drawing != Drawing::Nested
+    } else if sample.drawing() != Drawing::Nested
         && let Ok(independent) =
-            sample.drawing.independent_replicates(sample.replicates(values.len()) as u64)
+            sample.drawing().independent_replicates(sample.replicates(values.len()) as u64)
         && let Ok(each) =
             sample.split(values).iter().map(|v| Ordered::new(v)).collect::<Result<Vec<_>, _>>()
     {
@@ -522,7 +408,7 @@ mod tests {
     const GROUP: Group =
         Group { population: 0, variant: 1, mode: 0, flight_time: Some(0), outer: None };
 
-    const CHOSEN: Sample = Sample { drawing: Drawing::Designed, clusters: Clusters::Turns(1) };
+    const CHOSEN: Sample = Sample::turns(Drawing::Designed, 1);
 
     fn series(damping: &[f64]) -> Series {
         let mut series = Series::unknown(damping.len());
@@ -586,7 +472,7 @@ mod tests {
 
     #[test]
     fn replicates_take_turns_and_give_the_intervals_of_their_own_results() {
-        let sample = Sample { drawing: Drawing::LowDiscrepancy, clusters: Clusters::Turns(2) };
+        let sample = Sample::turns(Drawing::LowDiscrepancy, 2);
         let row =
             summarise(GROUP, sample, &series(&[0.01, -0.01, 0.03, -0.03, f64::NAN, 0.03])).unwrap();
         assert_eq!((row.intervals, row.share_unstable), (Intervals::Replicates, Some(0.5)));
@@ -597,7 +483,7 @@ mod tests {
         assert!((low - (middle - half)).abs() < 1e-10 && (high - (middle + half)).abs() < 1e-10);
         // Shares 1/3 (the failed case) and 2/3, cut off at 0 and 1.
         assert_eq!(row.share_unstable_interval, Some([0.0, 1.0]));
-        let single = Sample { clusters: Clusters::Turns(1), ..sample };
+        let single = Sample::turns(Drawing::LowDiscrepancy, 1);
         let row = summarise(GROUP, single, &series(&[0.01, 0.02, 0.03])).unwrap();
         assert_eq!((row.intervals, row.share_unstable_interval), (Intervals::None, None));
         assert_eq!(row.damping_ratio.unwrap().quantile_intervals, [None; 7]);

@@ -5,6 +5,7 @@
 
 pub mod actuator;
 pub mod check;
+pub mod compare;
 pub mod completions;
 pub mod error;
 pub mod gate;
@@ -19,6 +20,9 @@ pub mod progress;
 pub mod replay;
 pub mod run;
 pub mod schema;
+pub mod selection;
+pub mod sensitivity;
+pub mod statistics;
 pub mod summary;
 
 pub use error::Error;
@@ -56,6 +60,9 @@ enum Command {
     Nominal(nominal::Args),
     Run(run::Args),
     Summary(summary::Args),
+    Statistics(statistics::Args),
+    Sensitivity(sensitivity::Args),
+    Compare(compare::Args),
     Gate(gate::Args),
     Replay(replay::Args),
     HowMany(how_many::Args),
@@ -110,6 +117,9 @@ pub fn run() -> ExitCode {
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),
+        Command::Statistics(args) => statistics::run(args, &mut out),
+        Command::Sensitivity(args) => sensitivity::run(args, &mut out),
+        Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),

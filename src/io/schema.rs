@@ -9,7 +9,8 @@ use crate::campaign::metric::metrics;
 use crate::campaign::outline::{Outline, StoredPoles};
 use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
 use crate::campaign::row::{CaseRow, ModeRow};
-use crate::campaign::summary::{Intervals, LEVELS, Spread, Statement, SummaryRow, WorstRow};
+use crate::campaign::sample::Intervals;
+use crate::campaign::summary::{LEVELS, Spread, Statement, SummaryRow, WorstRow};
 use arrow::datatypes::Field;
 use std::sync::Arc;
 

@@ -5,9 +5,10 @@
 
 use super::run::Run;
 use super::schema::TableName;
+use crate::campaign::Sample;
 use crate::campaign::metric::{self, Metric, Quantity, metrics};
 use crate::campaign::summary::{
-    Group, Sample, Series, SummaryRow, WorstRow, groups, smallest, summarise, summarise_nested,
+    Group, Series, SummaryRow, WorstRow, groups, smallest, summarise, summarise_nested,
 };
 use crate::problem::Problems;
 use std::collections::BTreeMap;

@@ -213,7 +213,8 @@ fn worst_case(outline: &Outline, rows: &[&WorstRow]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::summary::{Sample, Series, groups, summarise};
+    use crate::campaign::Sample;
+    use crate::campaign::summary::{Series, groups, summarise};
     use crate::campaign::{StoredPoles, synthetic};
 
     fn summary(outline: &Outline) -> Vec<SummaryRow> {

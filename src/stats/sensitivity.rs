@@ -3,8 +3,8 @@
 //! Inputs are columns of numbers, results one number a case. Which of them are draws is not known.
 
 use super::{
-    Bootstrap, BootstrapInterval, Confidence, Error, Estimate, Independent, Method, Moments, Ordered,
-    Sides, normal, student,
+    Bootstrap, BootstrapInterval, Confidence, Error, Estimate, Independent, Method, Moments,
+    Ordered, Sides, normal, student,
 };
 use nalgebra::{DMatrix, DVector};
 
@@ -41,8 +41,12 @@ fn correlations(
         return Err(Error::TooFew { found: cases, needed: inputs + 3 });
     }
     let equal = || Error::Undefined("an input or the result has the same value in all cases");
-    let all: Option<Vec<_>> =
-        columns.iter().map(|c| standardised(c)).collect::<Result<Vec<_>, _>>()?.into_iter().collect();
+    let all: Option<Vec<_>> = columns
+        .iter()
+        .map(|c| standardised(c))
+        .collect::<Result<Vec<_>, _>>()?
+        .into_iter()
+        .collect();
     let x = DMatrix::from_columns(&all.ok_or_else(equal)?);
     let y = standardised(results)?.ok_or_else(equal)?;
     let inverse = (x.transpose() * &x)
@@ -156,15 +160,18 @@ pub fn given_data(
     if cases < 100 {
         return Err(Error::TooFew { found: cases as u64, needed: 100 });
     }
-    // About the cube root keeps both the bias of coarse bins and the noise of small ones low.
-    let bins = (cases as f64).cbrt().round().clamp(4.0, 50.0) as usize;
+    // Half the root of the cases: bins fine enough for one wave or two, and what chance puts between
+    // them is taken off.
+    let bins = ((cases as f64).sqrt() / 2.0).round().clamp(4.0, 100.0) as usize;
     let bootstrap = Bootstrap::new(resamples, confidence, BootstrapInterval::Percentile)?;
     let mean = Moments::of(results)?.mean().unwrap_or_default();
     let centred: Vec<f64> = results.iter().map(|y| y - mean).collect();
     let rows: Vec<f64> = (0..cases).map(|row| row as f64).collect();
     let index = |column: &Vec<f64>| {
-        let bin: Vec<usize> =
-            ranks(column).iter().map(|r| ((r - 0.5) * bins as f64 / cases as f64) as usize).collect();
+        let bin: Vec<usize> = ranks(column)
+            .iter()
+            .map(|r| ((r - 0.5) * bins as f64 / cases as f64) as usize)
+            .collect();
         let statistic = |rows: &mut [f64]| between_bins(&bin, &centred, bins, rows);
         bootstrap.estimate(&rows, statistic, &mut words, independent)
     };
@@ -305,8 +312,11 @@ mod tests {
                 ab[k].clone_from(&b[k]);
                 of(&ab)
             };
-            let results =
-                Crossed { first: of(&a), second: of(&b), crossed: (0..3).map(crossed_of).collect() };
+            let results = Crossed {
+                first: of(&a),
+                second: of(&b),
+                crossed: (0..3).map(crossed_of).collect(),
+            };
             let found = crossed(&results, (400, confidence()), words(seed), witness()).unwrap();
             for (found, closed) in found.iter().flatten().zip(closed().as_flattened()) {
                 misses += u64::from(!(found.lower() <= *closed && *closed <= found.upper()));
@@ -322,9 +332,10 @@ mod tests {
         let y: Vec<f64> = (0..8000).map(|i| ishigami([x[0][i], x[1][i], x[2][i]])).collect();
         let found = given_data(&x, &y, (400, confidence()), words(9), witness()).unwrap();
         for (found, [first, _]) in found.iter().zip(closed()) {
-            // Twenty bins leave out the variation inside them, under 0.02 here.
+            // 45 bins leave out the variation inside them, 0.7 % of the second index; the deviation of
+            // an index of 8000 cases is 0.01.
             assert!((found.point() - first).abs() < 0.03, "{} {first}", found.point());
-            assert!(found.lower() - 0.02 < first && first < found.upper() + 0.02);
+            assert!(found.lower() - 0.01 < first && first < found.upper() + 0.01);
         }
     }
 
@@ -353,7 +364,8 @@ mod tests {
     #[test]
     fn partial_ranks_see_a_monotone_effect_beneath_a_stronger_one() {
         let x = inputs(3, 3, 500);
-        let y: Vec<f64> = (0..500).map(|i| x[0][i].powi(3) + 20.0 * (2.0 * x[1][i]).exp()).collect();
+        let y: Vec<f64> =
+            (0..500).map(|i| x[0][i].powi(3) + 20.0 * (2.0 * x[1][i]).exp()).collect();
         let found = partial_ranks(&x, &y, confidence(), witness()).unwrap();
         assert!(found[1].point() > 0.95 && found[0].lower() > 0.0, "{found:?}");
         assert!(found[2].lower() < 0.0 && found[2].upper() > 0.0);
