@@ -1,7 +1,7 @@
 //! What a campaign is asked to do: cases, seed, flight times, variants and modes of interest.
 
 use crate::dispersion::Scheme;
-pub use crate::dynamics::NozzleJet;
+pub use crate::dynamics::{Feedback, NozzleJet};
 use crate::stats::Drawing;
 
 use serde::{Deserialize, Serialize};
@@ -34,6 +34,21 @@ pub struct Variant {
     pub follower_thrust: bool,
     /// Gimbal slope.
     pub slope: Slope,
+    /// Rigid translation and rotation free; off holds them at zero.
+    #[serde(default)]
+    pub rigid_body: bool,
+    /// Slosh masses free; off locks them to their tanks.
+    #[serde(default)]
+    pub slosh: bool,
+    /// Aerodynamic forces on.
+    #[serde(default)]
+    pub aerodynamics: bool,
+    /// What the autopilot does.
+    #[serde(default)]
+    pub feedback: Feedback,
+    /// Set of actuators in the place of the engines' own; engines without it keep theirs.
+    #[serde(default)]
+    pub actuators: Option<String>,
 }
 
 /// A set of cases evaluated in one run; tables hold populations in this order.
@@ -95,6 +110,14 @@ pub struct Definition {
 }
 
 impl Definition {
+    /// Adds cases to the dispersed population and to every corner's Monte Carlo.
+    pub fn add_cases(&mut self, more: u64) {
+        let free = |p: &&mut Population| p.drawn && !p.scheme.has_own_cases();
+        for population in self.populations.iter_mut().filter(free) {
+            population.cases = population.cases.saturating_add(more).min(MOST_CASES);
+        }
+    }
+
     /// Sets the number of cases of the dispersed population and of every corner's Monte Carlo;
     /// designs keep their own number.
     pub fn set_cases(&mut self, cases: u64) {

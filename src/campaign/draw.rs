@@ -4,19 +4,25 @@
 //! impulse, ablation follows the unablated nozzle, damping coefficients follow the reference
 //! inertia. What the drawn numbers do to the motion is decided in `dynamics`.
 
+use super::draw_servo::{self, Target};
 use super::{Failure, FailureKind};
 use crate::dispersion::{Affine, Parameters, Place, Quantity};
-use crate::dynamics::{DrawnBody, DrawnEngine, DrawnVehicle};
-use crate::vehicle::{Bearing, Engine, ModeSet, STANDARD_GRAVITY_M_S2, Vehicle};
+use crate::dynamics::{DrawnAerodynamics, DrawnBody, DrawnEngine, DrawnTank, DrawnVehicle};
+use crate::vehicle::motor::interpolate;
+use crate::vehicle::{Aerodynamics, Engine, ModeSet, STANDARD_GRAVITY_M_S2, Vehicle};
 use std::f64::consts::TAU;
 
 /// Where the parameters of one flight time stand among the effects of a case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slots {
     flight_time_s: f64,
+    /// Nominal mean acceleration, m/s², under which liquids slosh.
+    acceleration_m_s2: f64,
     structural_damping: usize,
     modes: Vec<ModeSlots>,
     engines: Vec<EngineSlots>,
+    /// Slope gain per sensor and mode.
+    sensors: Vec<Vec<usize>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -59,10 +65,18 @@ impl Slots {
         };
         Self {
             flight_time_s: set.flight_time_s,
+            acceleration_m_s2: vehicle.nominal_acceleration_m_s2(set),
             structural_damping: parameters.index(Quantity::StructuralDamping, Place::Vehicle),
             modes,
             engines: (0..vehicle.engines.len())
                 .map(|engine| EngineSlots { engine, gains: gains(engine) })
+                .collect(),
+            sensors: (0..vehicle.autopilot.as_ref().map_or(0, |a| a.sensors.len()))
+                .map(|sensor| {
+                    let place = |label: &usize| Place::SensorMode(sensor, *label);
+                    let index = |label| parameters.index(Quantity::SensorSlope, place(label));
+                    labels.iter().map(index).collect()
+                })
                 .collect(),
         }
     }
@@ -91,25 +105,58 @@ impl Slots {
         };
         let common = value(self.structural_damping, vehicle.structural_damping)?;
         self.draw_body(&mut drawn.body, common, &value)?;
+        let whole = |quantity, nominal| value(parameters.index(quantity, Place::Vehicle), nominal);
+        let inertia = [Quantity::RollInertia, Quantity::PitchInertia, Quantity::YawInertia];
+        for (gain, quantity) in drawn.body.inertia_gain.iter_mut().zip(inertia) {
+            *gain = whole(quantity, 1.0)?;
+        }
+        drawn.tanks.clear();
+        for (index, tank) in vehicle.tanks.iter().enumerate() {
+            let of =
+                |quantity, nominal| value(parameters.index(quantity, Place::Tank(index)), nominal);
+            let omega = tank.frequency_rad_s(self.flight_time_s, self.acceleration_m_s2);
+            drawn.tanks.push(DrawnTank {
+                mass_kg: of(Quantity::SloshMass, tank.mass_kg(self.flight_time_s))?,
+                frequency_rad_s: TAU * of(Quantity::SloshFrequency, omega / TAU)?,
+                damping_ratio: of(Quantity::SloshDamping, tank.damping_ratio)?,
+            });
+        }
+        let air = vehicle.aerodynamics.as_ref();
+        drawn.aerodynamics = air.map(|air| self.draw_air(air, &whole)).transpose()?;
         drawn.engines.resize(vehicle.engines.len(), DrawnEngine::default());
         for slots in &self.engines {
             let engine = &vehicle.engines[slots.engine];
             let of = |quantity, nominal| {
                 value(parameters.index(quantity, Place::Engine(slots.engine)), nominal)
             };
-            let actuator = |axis, quantity, nominal| {
-                value(parameters.index(quantity, Place::Actuator(slots.engine, axis)), nominal)
+            let actuator = |number, quantity, nominal| {
+                value(parameters.index(quantity, Place::Actuator(slots.engine, number)), nominal)
             };
             let to = &mut drawn.engines[slots.engine];
             self.draw_flow(engine, to, &of)?;
             self.draw_nozzle(engine, to, &of)?;
-            draw_gimbal(engine, to, &of, &actuator)?;
+            draw_servo::actuators(engine, to, &of, &actuator)?;
             to.shape_gain.clear();
             to.slope_gain.clear();
             for [shape, slope] in &slots.gains {
                 to.shape_gain.push(value(*shape, 1.0)?);
                 to.slope_gain.push(value(*slope, 1.0)?);
             }
+        }
+        if let Some(autopilot) = &vehicle.autopilot {
+            let target = |target: Target, nominal: f64| {
+                let index = match target {
+                    Target::Delay => parameters.index(Quantity::LoopDelay, Place::Vehicle),
+                    Target::Scale(s) => parameters.index(Quantity::SensorScale, Place::Sensor(s)),
+                    Target::Slope(sensor, mode) => self.sensors[sensor][mode],
+                    Target::Gain(p) => parameters.index(Quantity::PathGain, Place::Path(p)),
+                    Target::Filter(quantity, p, f) => {
+                        parameters.index(quantity, Place::Filter(p, f))
+                    }
+                };
+                value(index, nominal)
+            };
+            draw_servo::autopilot(autopilot, self.modes.len(), &mut drawn.autopilot, &target)?;
         }
         Ok(())
     }
@@ -132,6 +179,28 @@ impl Slots {
             body.damping_ratio.push(value(mode.damping, structural_damping)?);
         }
         Ok(())
+    }
+
+    /// Coefficients at the flight condition.
+    fn draw_air(
+        &self,
+        air: &Aerodynamics,
+        of: &impl Fn(Quantity, f64) -> Result<f64, Failure>,
+    ) -> Result<DrawnAerodynamics, Failure> {
+        let draw = |quantity, table: &[f64]| {
+            of(quantity, interpolate(&air.time_s, table, self.flight_time_s))
+        };
+        Ok(DrawnAerodynamics {
+            dynamic_pressure_pa: draw(Quantity::DynamicPressure, &air.dynamic_pressure_pa)?,
+            normal_force_slope_1_rad: draw(
+                Quantity::NormalForceSlope,
+                &air.normal_force_slope_1_rad,
+            )?,
+            center_of_pressure_x_m: draw(Quantity::CenterOfPressure, &air.center_of_pressure_x_m)?,
+            axial_force: draw(Quantity::AxialForce, &air.axial_force)?,
+            pitch_damping: draw(Quantity::PitchDamping, &air.pitch_damping)?,
+            roll_damping: draw(Quantity::RollDamping, &air.roll_damping)?,
+        })
     }
 
     /// ṁ = R_drawn/(Isp_drawn g) · profile_drawn, then any direct row.
@@ -180,28 +249,4 @@ impl Slots {
         positive("nozzle mass after ablation", to.mass_kg)?;
         positive("nozzle inertia about its cg, J_G − m r²,", to.central_inertia_kg_m2())
     }
-}
-
-/// K_a and C_a = 2 ζ √(J_ref K_nom), and the flex bearing where it is separate.
-fn draw_gimbal(
-    engine: &Engine,
-    to: &mut DrawnEngine,
-    of: &impl Fn(Quantity, f64) -> Result<f64, Failure>,
-    actuator: &impl Fn(usize, Quantity, f64) -> Result<f64, Failure>,
-) -> Result<(), Failure> {
-    let bearing_stiffness = of(Quantity::BearingStiffness, engine.bearing_stiffness_n_m_rad)?;
-    let bearing_damping = of(Quantity::BearingDamping, engine.bearing_damping_n_m_s_rad)?;
-    for (axis, nominal) in engine.actuators.iter().enumerate() {
-        let law = &nominal.law;
-        let stiffness = actuator(axis, Quantity::ActuatorStiffness, law.stiffness_n_m_rad)?;
-        let ratio = actuator(axis, Quantity::ActuatorDamping, law.damping_ratio)?;
-        let critical = (law.reference_inertia_kg_m2 * law.stiffness_n_m_rad).sqrt();
-        let separate = match nominal.bearing {
-            Bearing::Included => 0.0,
-            Bearing::Separate => bearing_stiffness,
-        };
-        to.gimbal_stiffness_n_m_rad[axis] = stiffness + separate;
-        to.gimbal_damping_n_m_s_rad[axis] = 2.0 * ratio * critical + bearing_damping;
-    }
-    Ok(())
 }

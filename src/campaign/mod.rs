@@ -3,8 +3,10 @@
 pub mod corner;
 pub mod definition;
 pub mod draw;
+mod draw_servo;
 pub mod evaluator;
 pub mod metric;
+pub mod nested;
 pub mod outline;
 pub mod plant;
 pub mod pool;

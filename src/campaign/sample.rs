@@ -39,6 +39,8 @@ impl Intervals {
 pub struct Sample {
     drawing: Drawing,
     clusters: Clusters,
+    /// Share of bad cases that an outer draw may have, and the risk of the statement.
+    statement: Option<(f64, f64)>,
 }
 
 /// Which cases belong to a replicate, or to an outer draw.
@@ -53,7 +55,7 @@ enum Clusters {
 impl Sample {
     /// Independent cases.
     pub const INDEPENDENT: Self =
-        Self { drawing: Drawing::Independent, clusters: Clusters::Turns(1) };
+        Self { drawing: Drawing::Independent, clusters: Clusters::Turns(1), statement: None };
 
     /// The cases of a population.
     pub fn of(population: &Population) -> Self {
@@ -61,13 +63,33 @@ impl Sample {
             Scheme::Nested { inner, .. } => Clusters::Rows(inner as usize),
             ref scheme => Clusters::Turns(scheme.replicates() as usize),
         };
-        Self { drawing: population.drawing(), clusters }
+        let statement = match population.scheme {
+            Scheme::Nested { allowed_share, risk, .. } => Some((allowed_share, risk)),
+            _ => None,
+        };
+        Self { drawing: population.drawing(), clusters, statement }
     }
 
     /// Cases that take turns among so many replicates.
-    #[cfg(test)]
     pub(super) const fn turns(drawing: Drawing, replicates: usize) -> Self {
-        Self { drawing, clusters: Clusters::Turns(replicates) }
+        Self { drawing, clusters: Clusters::Turns(replicates), statement: None }
+    }
+
+    /// Cases of an outer draw of a nested plan, and the share of bad ones that it may have with the
+    /// risk of saying so.
+    pub(super) fn nested(&self) -> Option<(u64, f64, f64)> {
+        match (self.clusters, self.statement) {
+            (Clusters::Rows(inner), Some((allowed, risk))) => Some((inner as u64, allowed, risk)),
+            _ => None,
+        }
+    }
+
+    /// Number of replicates among which cases take turns, where intervals follow from them.
+    pub(super) fn turning(&self) -> usize {
+        match (self.drawing, self.clusters) {
+            (Drawing::LatinHypercube | Drawing::LowDiscrepancy, Clusters::Turns(count)) => count,
+            _ => 1,
+        }
     }
 
     /// How the cases came about.

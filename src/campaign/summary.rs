@@ -1,17 +1,17 @@
 //! The summary of a run: one row per population, variant, flight time and named mode, and one of
 //! the cases reduced to their worst flight time; the worst cases.
 //!
-//! Works on series with one number per case; where they are read from is decided in `io`.
+//! Works on cases that pass by one after the other, so that its memory does not grow with their
+//! number; where they are read from is decided in `io`.
 
-use super::definition::{Definition, Population};
-use super::sample::{CONFIDENCE, Intervals, Sample, ends, known};
-use crate::dispersion::Scheme;
+use super::definition::Definition;
+use super::nested::{Nested, OuterDraws, Statement};
+use super::sample::{CONFIDENCE, Intervals, Sample, ends};
 use crate::stats::{
-    Confidence, Drawing, Error, Moments, Ordered, Probability, Sides, clopper_pearson,
-    of_replicates, rejects_at_least, rejects_at_most,
+    Confidence, Drawing, Error, Moments, Probability, RunningMoments, Selection, Sides,
+    clopper_pearson, interval_ranks, of_replicates, quantile_of,
 };
 use std::f64::consts::LN_2;
-use std::ops::Range;
 
 /// Levels of the quantiles of the damping ratio and the words for them in column names, in percent;
 /// 0.135 % and 99.865 % lie three standard deviations from the mean of a normal law.
@@ -40,59 +40,36 @@ pub struct Group {
     pub outer: Option<u64>,
 }
 
-/// What was found for each case of a group, by case index; NaN where the evaluation failed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Series {
+/// What was found for a case of a group; NaN where there is nothing, as after a failure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
     /// Damping ratio of the less stable pole, −.
-    pub damping_ratio: Vec<f64>,
+    pub damping_ratio: f64,
     /// Frequency of that pole, Hz.
-    pub frequency_hz: Vec<f64>,
+    pub frequency_hz: f64,
     /// Largest real part of the poles, rad/s.
-    pub pole_re_rad_s: Vec<f64>,
-    /// Gain of damping ratio over the first variant, −; empty for that variant.
-    pub damping_ratio_gain: Vec<f64>,
+    pub pole_re_rad_s: f64,
+    /// Gain of damping ratio over the first variant, −; NaN for that variant.
+    pub damping_ratio_gain: f64,
 }
 
-impl Series {
-    /// A series in which nothing has been evaluated yet.
-    pub fn unknown(cases: usize) -> Self {
-        Self {
-            damping_ratio: vec![f64::NAN; cases],
-            frequency_hz: vec![f64::NAN; cases],
-            pole_re_rad_s: vec![f64::NAN; cases],
-            damping_ratio_gain: Vec::new(),
-        }
-    }
+impl Found {
+    /// Nothing yet.
+    pub const NOTHING: Self = Self {
+        damping_ratio: f64::NAN,
+        frequency_hz: f64::NAN,
+        pole_re_rad_s: f64::NAN,
+        damping_ratio_gain: f64::NAN,
+    };
 
-    /// The cases in `range`.
-    pub fn part(&self, range: Range<usize>) -> Self {
-        let part = |values: &[f64]| values.get(range.clone()).unwrap_or_default().to_vec();
-        Self {
-            damping_ratio: part(&self.damping_ratio),
-            frequency_hz: part(&self.frequency_hz),
-            pole_re_rad_s: part(&self.pole_re_rad_s),
-            damping_ratio_gain: part(&self.damping_ratio_gain),
-        }
-    }
-
-    /// Bytes per case while a group is summed up, the sorted copies included.
-    pub const BYTES_PER_CASE: usize = 8 * size_of::<f64>();
-
-    /// Takes in a pole of a case; of several, the less stable one stays.
-    pub fn add(&mut self, case: usize, damping_ratio: f64, frequency_hz: f64, pole_re_rad_s: f64) {
-        let known = self.damping_ratio[case];
-        if known.is_nan() || damping_ratio < known {
-            self.damping_ratio[case] = damping_ratio;
-            self.frequency_hz[case] = frequency_hz;
+    /// Takes in a pole of the case; of several, the less stable one stays.
+    pub fn add(&mut self, damping_ratio: f64, frequency_hz: f64, pole_re_rad_s: f64) {
+        if self.damping_ratio.is_nan() || damping_ratio < self.damping_ratio {
+            self.damping_ratio = damping_ratio;
+            self.frequency_hz = frequency_hz;
         }
         // Of NaN and a number, the number.
-        self.pole_re_rad_s[case] = self.pole_re_rad_s[case].max(pole_re_rad_s);
-    }
-
-    /// Sets the gain of damping ratio over the first variant, case by case.
-    pub fn compare(&mut self, first: &[f64]) {
-        self.damping_ratio_gain =
-            self.damping_ratio.iter().zip(first).map(|(here, first)| here - first).collect();
+        self.pole_re_rad_s = self.pole_re_rad_s.max(pole_re_rad_s);
     }
 }
 
@@ -142,209 +119,279 @@ pub struct SummaryRow {
     pub damping_ratio_gain: Option<[f64; 2]>,
     /// Interval of the mean gain.
     pub gain_mean_interval: Option<[f64; 2]>,
-    /// What the outer draws show, of a nested plan's cases reduced over the flight times.
+    /// What the outer draws show, of all cases of a nested plan.
     pub outer: Option<OuterDraws>,
     /// The statement on this outer draw.
     pub statement: Option<Statement>,
 }
 
-/// Whether an outer draw meets the statement of its plan: that the share of unstable or failed
-/// inner cases is at most the allowed one, at the consumer's risk.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Statement {
-    /// Shown.
-    Met,
-    /// The contrary is shown.
-    NotMet,
-    /// Neither.
-    Undecided,
-}
-
-impl Statement {
-    /// Every one, in the order of declaration.
-    pub const ALL: [Self; 3] = [Self::Met, Self::NotMet, Self::Undecided];
-
-    /// The word stored in the `statement` column.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Met => "met",
-            Self::NotMet => "not_met",
-            Self::Undecided => "undecided",
-        }
-    }
-}
-
-/// What the outer draws of a nested plan show.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OuterDraws {
-    /// Outer draws that meet the statement.
-    pub met: u64,
-    /// Outer draws that do not.
-    pub not_met: u64,
-    /// Share of all outer draws that meet it.
-    pub share_met: f64,
-    /// Its exact binomial interval: outer draws are independent.
-    pub share_met_interval: [f64; 2],
-}
-
-/// Sums up one group of cases that came about as `sample` says.
-///
-/// # Errors
-/// None for a series whose numbers are finite or NaN; else what `stats` says of them.
-pub fn summarise(group: Group, sample: Sample, series: &Series) -> Result<SummaryRow, Error> {
-    let frequency: Vec<f64> = known(&series.frequency_hz);
-    let gain: Vec<f64> = known(&series.damping_ratio_gain);
-    let cases = series.damping_ratio.len() as u64;
-    let evaluated = series.damping_ratio.iter().filter(|value| !value.is_nan()).count() as u64;
-    let re_max = series.pole_re_rad_s.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let unstable = series.pole_re_rad_s.iter().filter(|re| **re > 0.0).count() as u64;
-    let failures = cases - evaluated;
-    let confidence = Confidence::new(CONFIDENCE)?;
-    // A failed case counts as a bad one.
-    let bad: Vec<f64> = (series.damping_ratio.iter().zip(&series.pole_re_rad_s))
-        .map(|(damping, re)| f64::from(u8::from(damping.is_nan() || *re > 0.0)))
-        .collect();
-    let share = |independent| {
-        let bad = unstable + failures;
-        clopper_pearson(bad, cases, confidence, Sides::Two, independent).ok().map(ends)
-    };
-    let shown = evaluated > 0;
-    let interval = sample.interval(&bad, share, mean_of).filter(|_| shown);
-    Ok(SummaryRow {
-        group,
-        cases,
-        failures,
-        unstable,
-        share_unstable: shown.then(|| (unstable + failures) as f64 / cases as f64),
-        share_unstable_interval: interval.map(|ends| ends.map(|end| end.clamp(0.0, 1.0))),
-        intervals: sample.intervals(series.damping_ratio.len()),
-        damping_ratio: spread(&sample, &series.damping_ratio)?,
-        frequency_hz_mean: Moments::of(&frequency)?.mean(),
-        time_to_double_min_s: (re_max > 0.0).then(|| LN_2 / re_max),
-        damping_ratio_gain: Moments::of(&gain)?
-            .mean()
-            .map(|mean| [gain.iter().copied().fold(f64::INFINITY, f64::min), mean]),
-        gain_mean_interval: mean_interval(&sample, &series.damping_ratio_gain),
-        outer: None,
-        statement: None,
-    })
-}
-
-/// Sums up the cases of a nested plan: a row for all of them with what the outer draws show, and a row
-/// for each outer draw. `allowed_share` and `risk` are those of the plan.
-///
-/// # Errors
-/// As [`summarise`].
-pub fn summarise_nested(
+/// Sums up one group from its cases, which pass by in the order of their index, several times if
+/// there are too many to hold: all statistics are exact.
+#[derive(Debug, Clone)]
+pub struct Tally {
     group: Group,
-    population: &Population,
-    series: &Series,
-) -> Result<Vec<SummaryRow>, Error> {
-    let mut all = summarise(group, Sample::of(population), series)?;
-    let Scheme::Nested { inner, allowed_share, risk, .. } = population.scheme else {
-        return Ok(vec![all]);
-    };
-    let (allowed, risk) = (Probability::new(allowed_share)?, Confidence::from_risk(risk)?);
-    let independent = Drawing::Independent.independent()?;
-    let mut rows = Vec::new();
-    for (outer, first) in (0..).zip((0..series.damping_ratio.len()).step_by(inner as usize)) {
-        let part = series.part(first..first + inner as usize);
-        let mut row = summarise(Group { outer: Some(outer), ..group }, Sample::INDEPENDENT, &part)?;
-        let (bad, cases) = (row.unstable + row.failures, row.cases);
-        row.statement = Some(if rejects_at_least(bad, cases, allowed, risk, independent)? {
-            Statement::Met
-        } else if rejects_at_most(bad, cases, allowed, risk, independent)? {
-            Statement::NotMet
-        } else {
-            Statement::Undecided
-        });
-        rows.push(row);
+    sample: Sample,
+    first_pass: bool,
+    /// Cases taken in this pass.
+    taken: u64,
+    cases: u64,
+    unstable: u64,
+    pole_re_max: f64,
+    damping: RunningMoments,
+    frequency: RunningMoments,
+    gain: RunningMoments,
+    gain_min: f64,
+    order: Selection,
+    /// The replicates among which cases take turns; none if there is one.
+    replicates: Vec<Self>,
+    /// The outer draws of a nested plan.
+    nested: Option<Nested>,
+}
+
+impl Tally {
+    /// A tally of no cases, which come about as `sample` says, that holds about `most` values.
+    pub fn new(group: Group, sample: Sample, most: usize) -> Self {
+        let count = sample.turning();
+        let part = || Self::new(group, Sample::turns(Drawing::Designed, 1), most / count);
+        let replicates = if count > 1 { (0..count).map(|_| part()).collect() } else { Vec::new() };
+        Self {
+            group,
+            sample,
+            replicates,
+            nested: sample.nested().map(|nested| Nested::new(group, nested)),
+            first_pass: true,
+            taken: 0,
+            cases: 0,
+            unstable: 0,
+            pole_re_max: f64::NEG_INFINITY,
+            damping: RunningMoments::default(),
+            frequency: RunningMoments::default(),
+            gain: RunningMoments::default(),
+            gain_min: f64::INFINITY,
+            order: Selection::new(most),
+        }
     }
-    let count = |statement| rows.iter().filter(|r| r.statement == Some(statement)).count() as u64;
-    let (met, outer_draws) = (count(Statement::Met), rows.len() as u64);
-    let confidence = Confidence::new(CONFIDENCE)?;
-    let share = clopper_pearson(met, outer_draws, confidence, Sides::Two, independent)?;
-    all.outer = Some(OuterDraws {
-        met,
-        not_met: count(Statement::NotMet),
-        share_met: share.point(),
-        share_met_interval: ends(share),
-    });
-    rows.insert(0, all);
-    Ok(rows)
-}
 
-fn mean_of(values: &[f64]) -> Option<f64> {
-    Moments::of(values).ok()?.mean()
-}
-
-/// Interval of the mean of the values that are known.
-fn mean_interval(sample: &Sample, values: &[f64]) -> Option<[f64; 2]> {
-    let exact = |independent| {
-        let moments = Moments::of(&known(values)).ok()?;
-        let confidence = Confidence::new(CONFIDENCE).ok()?;
-        moments.mean_interval(confidence, Sides::Two, independent).ok().map(ends)
-    };
-    sample.interval(values, exact, mean_of)
-}
-
-/// Intervals of the quantiles at [`LEVELS`]; `ordered` holds the known ones among `values`.
-fn quantile_intervals(
-    sample: &Sample,
-    values: &[f64],
-    ordered: &Ordered,
-) -> Result<[Option<[f64; 2]>; LEVELS.len()], Error> {
-    let mut intervals = [None; LEVELS.len()];
-    let confidence = Confidence::new(CONFIDENCE)?;
-    if let Ok(independent) = sample.drawing().independent() {
-        // Failed cases may lie anywhere: beyond every value for the end on either side.
-        let failed = values.len() - ordered.len();
-        let with = |value: f64| {
-            let failed = std::iter::repeat_n(value, failed);
-            Ordered::new(&ordered.values().iter().copied().chain(failed).collect::<Vec<_>>())
-        };
-        let (low, high) = (with(f64::NEG_INFINITY)?, with(f64::INFINITY)?);
-        for (interval, (level, _)) in intervals.iter_mut().zip(LEVELS) {
-            let level = Probability::new(level)?;
-            let of = |sample: &Ordered| {
-                sample.quantile_interval(level, confidence, Sides::Two, independent)
+    /// Takes the next case.
+    ///
+    /// # Errors
+    /// None for numbers that are finite or NaN; else what `stats` says of them.
+    pub fn add(&mut self, found: &Found) -> Result<(), Error> {
+        if self.first_pass {
+            self.cases += 1;
+            self.unstable += u64::from(found.pole_re_rad_s > 0.0);
+            self.pole_re_max = self.pole_re_max.max(found.pole_re_rad_s);
+            let known = |value: f64, moments: &mut RunningMoments| {
+                if value.is_nan() { Ok(()) } else { moments.push(value) }
             };
-            *interval = Some([of(&low).lower(), of(&high).upper()]);
+            known(found.damping_ratio, &mut self.damping)?;
+            known(found.frequency_hz, &mut self.frequency)?;
+            known(found.damping_ratio_gain, &mut self.gain)?;
+            self.gain_min = self.gain_min.min(found.damping_ratio_gain);
         }
-    } else if sample.drawing() != Drawing::Nested
-        && let Ok(independent) =
-            sample.drawing().independent_replicates(sample.replicates(values.len()) as u64)
-        && let Ok(each) =
-            sample.split(values).iter().map(|v| Ordered::new(v)).collect::<Result<Vec<_>, _>>()
-    {
-        // Not for a nested plan: quantiles of inner campaigns say nothing of all cases.
-        for (interval, (level, _)) in intervals.iter_mut().zip(LEVELS) {
-            let level = Probability::new(level)?;
-            let quantiles: Vec<f64> = each.iter().map(|sample| sample.quantile(level)).collect();
-            *interval = of_replicates(&quantiles, confidence, independent).ok().map(ends);
+        if !found.damping_ratio.is_nan() {
+            self.order.push(found.damping_ratio);
         }
+        if !self.replicates.is_empty() {
+            let turn = self.taken % self.replicates.len() as u64;
+            self.replicates[turn as usize].add(found)?;
+        }
+        if let Some(nested) = self.nested.as_mut().filter(|_| self.first_pass) {
+            nested.add(found)?;
+        }
+        self.taken += 1;
+        Ok(())
     }
-    Ok(intervals)
+
+    /// Ends a pass over all cases; whether it was the last.
+    ///
+    /// # Errors
+    /// None: the levels are levels.
+    pub fn end_pass(&mut self) -> Result<bool, Error> {
+        self.first_pass = false;
+        self.taken = 0;
+        let count = self.order.count();
+        let mut ranks = vec![0, count.saturating_sub(1)];
+        if count > 0 {
+            for (level, _) in LEVELS {
+                quantile_of(count, Probability::new(level)?, |rank| {
+                    ranks.push(rank);
+                    0.0
+                });
+            }
+        }
+        for interval in self.interval_ranks()?.into_iter().flatten().flatten() {
+            ranks.extend(interval);
+        }
+        let mut done = self.order.end_pass(&ranks);
+        for replicate in &mut self.replicates {
+            done &= replicate.end_pass()?;
+        }
+        Ok(done)
+    }
+
+    /// Ranks among the known values of the ends of the intervals of the quantiles; none for an end
+    /// beyond them. Failed cases may lie anywhere: beyond every value for the end on either side.
+    fn interval_ranks(&self) -> Result<Option<[[Option<u64>; 2]; LEVELS.len()]>, Error> {
+        let Ok(independent) = self.sample.drawing().independent() else { return Ok(None) };
+        let (known, failures) = (self.order.count(), self.failures());
+        let confidence = Confidence::new(CONFIDENCE)?;
+        let mut ranks = [[None; 2]; LEVELS.len()];
+        for (ranks, (level, _)) in ranks.iter_mut().zip(LEVELS) {
+            let level = Probability::new(level)?;
+            let [low, high] = interval_ranks(self.cases, level, confidence, independent);
+            *ranks = [
+                low.and_then(|rank| rank.checked_sub(failures)),
+                high.filter(|rank| *rank < known),
+            ];
+        }
+        Ok((known > 0).then_some(ranks))
+    }
+
+    fn failures(&self) -> u64 {
+        self.cases - self.order.count()
+    }
+
+    /// Cases that are unstable or failed.
+    pub(super) fn bad(&self) -> u64 {
+        self.unstable + self.failures()
+    }
+
+    /// Cases so far.
+    pub(super) fn cases(&self) -> u64 {
+        self.cases
+    }
+
+    /// Means of damping ratio and gain of the cases that have them.
+    pub(super) fn means(&self) -> [Option<f64>; 2] {
+        [&self.damping, &self.gain].map(|values| values.moments().mean())
+    }
+
+    /// The interval over replicates or outer draws of a statistic of each, where it follows.
+    fn over_replicates(&self, values: Option<Vec<f64>>) -> Option<[f64; 2]> {
+        let values = values?;
+        let drawing = self.sample.drawing();
+        let independent = drawing.independent_replicates(values.len() as u64).ok()?;
+        let confidence = Confidence::new(CONFIDENCE).ok()?;
+        of_replicates(&values, confidence, independent).ok().map(ends)
+    }
+
+    /// The interval of a mean: `place` is its place in [`Tally::means`].
+    fn mean_interval(&self, moments: Moments, place: usize) -> Option<[f64; 2]> {
+        if let Ok(independent) = self.sample.drawing().independent() {
+            let confidence = Confidence::new(CONFIDENCE).ok()?;
+            return moments.mean_interval(confidence, Sides::Two, independent).ok().map(ends);
+        }
+        self.over_replicates(match &self.nested {
+            Some(nested) => nested.means(place),
+            None => self.replicates.iter().map(|tally| tally.means()[place]).collect(),
+        })
+    }
+
+    fn share_interval(&self) -> Result<Option<[f64; 2]>, Error> {
+        if let Ok(independent) = self.sample.drawing().independent() {
+            let confidence = Confidence::new(CONFIDENCE)?;
+            let (bad, cases) = (self.bad(), self.cases);
+            let share = clopper_pearson(bad, cases, confidence, Sides::Two, independent)?;
+            return Ok(Some(ends(share)));
+        }
+        let share = |tally: &Self| tally.bad() as f64 / tally.cases as f64;
+        let found = self.over_replicates(Some(match &self.nested {
+            Some(nested) => nested.shares(),
+            None => self.replicates.iter().map(share).collect(),
+        }));
+        Ok(found.map(|ends| ends.map(|end| end.clamp(0.0, 1.0))))
+    }
+
+    /// The rows of the outer draws of a nested plan, whose cases are reduced over the flight times.
+    pub fn outer_rows(&self) -> &[SummaryRow] {
+        self.nested.as_ref().map_or(&[], |nested| nested.rows())
+    }
+
+    /// The row of the summary, once the last pass has ended.
+    ///
+    /// # Errors
+    /// What `stats` says.
+    pub fn row(&self) -> Result<SummaryRow, Error> {
+        let evaluated = self.order.count();
+        let shown = evaluated > 0;
+        let drawing = self.sample.drawing();
+        let replicates = self.sample.replicates(self.cases as usize) as u64;
+        Ok(SummaryRow {
+            group: self.group,
+            cases: self.cases,
+            failures: self.failures(),
+            unstable: self.unstable,
+            share_unstable: shown.then(|| self.bad() as f64 / self.cases as f64),
+            share_unstable_interval: if shown { self.share_interval()? } else { None },
+            intervals: if drawing.independent().is_ok() {
+                Intervals::Independent
+            } else if drawing.independent_replicates(replicates).is_ok() {
+                Intervals::Replicates
+            } else {
+                Intervals::None
+            },
+            damping_ratio: self.spread()?,
+            frequency_hz_mean: self.frequency.moments().mean(),
+            time_to_double_min_s: (self.pole_re_max > 0.0).then(|| LN_2 / self.pole_re_max),
+            damping_ratio_gain: self.gain.moments().mean().map(|mean| [self.gain_min, mean]),
+            gain_mean_interval: self.mean_interval(self.gain.moments(), 1),
+            outer: self.nested.as_ref().map(Nested::outer_draws).transpose()?,
+            statement: None,
+        })
+    }
+
+    fn quantile(&self, level: Probability) -> Option<f64> {
+        let count = self.order.count();
+        (count > 0).then(|| quantile_of(count, level, |rank| self.order.value(rank)))
+    }
+
+    fn quantile_intervals(&self) -> Result<[Option<[f64; 2]>; LEVELS.len()], Error> {
+        let mut intervals = [None; LEVELS.len()];
+        if let Some(ranks) = self.interval_ranks()? {
+            for (interval, [low, high]) in intervals.iter_mut().zip(ranks) {
+                let end = |rank: Option<u64>, beyond| rank.map_or(beyond, |r| self.order.value(r));
+                *interval = Some([end(low, f64::NEG_INFINITY), end(high, f64::INFINITY)]);
+            }
+        } else if !self.replicates.is_empty() {
+            for (interval, (level, _)) in intervals.iter_mut().zip(LEVELS) {
+                let level = Probability::new(level)?;
+                let each = self.replicates.iter().map(|tally| tally.quantile(level));
+                *interval = self.over_replicates(each.collect());
+            }
+        }
+        Ok(intervals)
+    }
+
+    fn spread(&self) -> Result<Option<Spread>, Error> {
+        let (moments, count) = (self.damping.moments(), self.order.count());
+        let Some(mean) = moments.mean() else { return Ok(None) };
+        let mut quantiles = [0.0; LEVELS.len()];
+        for (quantile, (level, _)) in quantiles.iter_mut().zip(LEVELS) {
+            let level = Probability::new(level)?;
+            *quantile = quantile_of(count, level, |rank| self.order.value(rank));
+        }
+        Ok(Some(Spread {
+            mean,
+            mean_interval: self.mean_interval(moments, 0),
+            standard_deviation: moments.standard_deviation(),
+            smallest: self.order.value(0),
+            quantiles,
+            quantile_intervals: self.quantile_intervals()?,
+            largest: self.order.value(count - 1),
+        }))
+    }
 }
 
-fn spread(sample: &Sample, series: &[f64]) -> Result<Option<Spread>, Error> {
-    let values = known(series);
-    let moments = Moments::of(&values)?;
-    let Some(mean) = moments.mean() else { return Ok(None) };
-    let ordered = Ordered::new(&values)?;
-    let mut quantiles = [0.0; LEVELS.len()];
-    for (quantile, (level, _)) in quantiles.iter_mut().zip(LEVELS) {
-        *quantile = ordered.quantile(Probability::new(level)?);
-    }
-    Ok(Some(Spread {
-        mean,
-        mean_interval: mean_interval(sample, series),
-        standard_deviation: moments.standard_deviation(),
-        smallest: ordered.smallest(),
-        quantiles,
-        quantile_intervals: quantile_intervals(sample, series, &ordered)?,
-        largest: ordered.largest(),
-    }))
+/// Sums up one group whose cases are at hand.
+///
+/// # Errors
+/// None for numbers that are finite or NaN; else what `stats` says of them.
+pub fn summarise(group: Group, sample: Sample, cases: &[Found]) -> Result<SummaryRow, Error> {
+    let mut tally = Tally::new(group, sample, usize::MAX);
+    cases.iter().try_for_each(|found| tally.add(found))?;
+    tally.end_pass()?;
+    tally.row()
 }
 
 /// Every group of a population in the order of the summary: by variant, flight time (the worst
@@ -389,33 +436,54 @@ pub struct WorstRow {
     pub score: Option<f64>,
 }
 
-/// Indices of the `most` smallest values, the smallest first, equal ones by index; NaN is no value.
-pub fn smallest(values: &[f64], most: usize) -> Vec<usize> {
-    let mut found: Vec<usize> = Vec::with_capacity(most.saturating_add(1).min(values.len()));
-    for (index, value) in values.iter().enumerate().filter(|(_, value)| !value.is_nan()) {
-        if found.len() < most || found.last().is_some_and(|last| *value < values[*last]) {
-            found.insert(found.partition_point(|other| values[*other] <= *value), index);
-            found.truncate(most);
+/// The smallest of many values, each with what belongs to it; of equal ones the earlier.
+#[derive(Debug, Clone)]
+pub struct Smallest<T> {
+    most: usize,
+    found: Vec<(f64, T)>,
+}
+
+impl<T> Smallest<T> {
+    /// None yet, and at most `most`.
+    pub fn new(most: usize) -> Self {
+        Self { most, found: Vec::new() }
+    }
+
+    /// Takes a value; NaN is none.
+    pub fn push(&mut self, value: f64, item: impl FnOnce() -> T) {
+        let full = self.found.len() >= self.most;
+        let better = !full || self.found.last().is_some_and(|(last, _)| value < *last);
+        if better && !value.is_nan() && self.most > 0 {
+            let at = self.found.partition_point(|(other, _)| *other <= value);
+            self.found.insert(at, (value, item()));
+            self.found.truncate(self.most);
         }
     }
-    found
+
+    /// The values and what belongs to them, the smallest first.
+    pub fn into_found(self) -> Vec<(f64, T)> {
+        self.found
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::definition::Population;
     use super::*;
+    use crate::dispersion::Scheme;
 
     const GROUP: Group =
         Group { population: 0, variant: 1, mode: 0, flight_time: Some(0), outer: None };
 
-    const CHOSEN: Sample = Sample::turns(Drawing::Designed, 1);
-
-    fn series(damping: &[f64]) -> Series {
-        let mut series = Series::unknown(damping.len());
-        for (case, damping) in damping.iter().enumerate().filter(|(_, d)| !d.is_nan()) {
-            series.add(case, *damping, 5.0, -damping * 31.0);
-        }
-        series
+    fn series(damping: &[f64]) -> Vec<Found> {
+        let found = |damping: &f64| {
+            let mut found = Found::NOTHING;
+            if !damping.is_nan() {
+                found.add(*damping, 5.0, -damping * 31.0);
+            }
+            found
+        };
+        damping.iter().map(found).collect()
     }
 
     #[test]
@@ -437,7 +505,7 @@ mod tests {
 
     #[test]
     fn a_chosen_case_has_no_interval() {
-        let row = summarise(GROUP, CHOSEN, &series(&[0.01])).unwrap();
+        let row = summarise(GROUP, Sample::turns(Drawing::Designed, 1), &series(&[0.01])).unwrap();
         assert_eq!((row.share_unstable, row.share_unstable_interval), (Some(0.0), None));
         assert_eq!(row.damping_ratio.unwrap().standard_deviation, None);
     }
@@ -453,7 +521,9 @@ mod tests {
     #[test]
     fn the_gain_is_paired_case_by_case() {
         let mut with = series(&[0.03, 0.02, f64::NAN]);
-        with.compare(&[0.01, f64::NAN, 0.01]);
+        for (found, first) in with.iter_mut().zip([0.01, f64::NAN, 0.01]) {
+            found.damping_ratio_gain = found.damping_ratio - first;
+        }
         let [least, mean] =
             summarise(GROUP, Sample::INDEPENDENT, &with).unwrap().damping_ratio_gain.unwrap();
         assert_eq!((least, mean), (0.03 - 0.01, 0.03 - 0.01));
@@ -461,13 +531,34 @@ mod tests {
 
     #[test]
     fn of_several_poles_the_less_stable_one_stays() {
-        let mut series = Series::unknown(1);
-        series.add(0, 0.02, 5.0, -0.6);
-        series.add(0, -0.01, 5.5, 0.3);
-        series.add(0, 0.05, 4.0, -1.0);
-        assert_eq!(series.damping_ratio, [-0.01]);
-        assert_eq!(series.frequency_hz, [5.5]);
-        assert_eq!(series.pole_re_rad_s, [0.3]);
+        let mut found = Found::NOTHING;
+        found.add(0.02, 5.0, -0.6);
+        found.add(-0.01, 5.5, 0.3);
+        found.add(0.05, 4.0, -1.0);
+        assert_eq!((found.damping_ratio, found.frequency_hz), (-0.01, 5.5));
+        assert_eq!(found.pole_re_rad_s, 0.3);
+    }
+
+    #[test]
+    fn a_row_is_the_same_to_the_last_bit_however_few_values_are_held() {
+        let damping: Vec<f64> = (0..5000)
+            .map(|i| if i % 50 == 3 { f64::NAN } else { (f64::from(i) * 0.7).sin() * 0.02 })
+            .collect();
+        let cases = series(&damping);
+        let whole = summarise(GROUP, Sample::INDEPENDENT, &cases).unwrap();
+        for most in [0, 10, 1000] {
+            let mut tally = Tally::new(GROUP, Sample::INDEPENDENT, most);
+            let mut passes = 0;
+            loop {
+                cases.iter().for_each(|found| tally.add(found).unwrap());
+                passes += 1;
+                if tally.end_pass().unwrap() {
+                    break;
+                }
+            }
+            assert!(passes > 1);
+            assert_eq!(tally.row().unwrap(), whole);
+        }
     }
 
     #[test]
@@ -525,7 +616,16 @@ mod tests {
             })
             .collect();
         let group = Group { flight_time: None, ..GROUP };
-        let rows = summarise_nested(group, &population, &series(&damping)).unwrap();
+        let cases = series(&damping);
+        let mut tally = Tally::new(group, Sample::of(&population), 10);
+        loop {
+            cases.iter().for_each(|found| tally.add(found).unwrap());
+            if tally.end_pass().unwrap() {
+                break;
+            }
+        }
+        let mut rows = vec![tally.row().unwrap()];
+        rows.extend_from_slice(tally.outer_rows());
         let statements: Vec<_> = rows.iter().map(|r| (r.group.outer, r.statement)).collect();
         let expected = [
             (None, None),
@@ -546,6 +646,11 @@ mod tests {
     #[test]
     fn the_smallest_values_come_in_order_with_ties_by_index() {
         let values = [3.0, f64::NAN, 1.0, 2.0, 1.0, 5.0, -1.0];
+        let smallest = |values: &[f64], most: usize| -> Vec<usize> {
+            let mut smallest = Smallest::new(most);
+            values.iter().enumerate().for_each(|(index, value)| smallest.push(*value, || index));
+            smallest.into_found().into_iter().map(|(_, index)| index).collect()
+        };
         assert_eq!(smallest(&values, 4), [6, 2, 4, 3]);
         assert_eq!(smallest(&values, 100), [6, 2, 4, 3, 0, 5]);
         assert_eq!(smallest(&values, 0), [0; 0]);

@@ -3,7 +3,7 @@
 //! No physics: the numbers only have to be unlike each other and to include failures, unstable
 //! poles and pairs of poles that exchange character.
 
-use super::definition::{Definition, NozzleJet, Population, Slope, Variant};
+use super::definition::{Definition, Feedback, NozzleJet, Population, Slope, Variant};
 use super::outline::{DrawColumn, Input, Outline, StoredPoles};
 use super::record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};
 use crate::dispersion::Scheme;
@@ -18,6 +18,11 @@ pub fn definition(cases: &[u64]) -> Definition {
         nozzle_jet_damping: if jet { NozzleJet::Linear } else { NozzleJet::Off },
         follower_thrust: false,
         slope: Slope::VirtualGrid,
+        rigid_body: false,
+        slosh: false,
+        aerodynamics: false,
+        feedback: Feedback::Open,
+        actuators: None,
     };
     let names = ["nominal", "dispersed", "corner_dispersed"];
     let population = |(index, &cases): (usize, &u64)| Population {
@@ -86,7 +91,7 @@ pub fn evaluate(
                 }
                 _ => Ok(poles(definition, variant, case, stored, &mut random)),
             };
-            evaluations.push(Evaluation { variant, flight_time, outcome });
+            evaluations.push(Evaluation { variant, flight_time, null_poles: 0, outcome });
         }
     }
     Record {
@@ -117,8 +122,7 @@ fn poles(
                 30.0 + random.next(),
             ),
             identity_confidence: mode.map(|_| random.next()),
-            participation_structure: Some(random.next()),
-            participation_nozzle: Some(random.next()),
+            participation: Some(std::array::from_fn(|_| random.next())),
             residual: mode.map(|_| 1e-15 * random.next()),
         });
     };

@@ -122,10 +122,10 @@ fn common_draws(
         }
     }
     for pairs in pairs.chunks(AT_ONCE) {
-        let first: Vec<&str> = pairs.iter().map(|(a, _)| a.column.as_str()).collect();
-        let second: Vec<&str> = pairs.iter().map(|(_, b)| b.column.as_str()).collect();
-        let first = runs[0].numbers(places[0], &first)?;
-        let second = runs[1].numbers(places[1], &second)?;
+        let first: Vec<String> = pairs.iter().map(|(a, _)| a.column.clone()).collect();
+        let second: Vec<String> = pairs.iter().map(|(_, b)| b.column.clone()).collect();
+        let first = selection::values(&runs[0], places[0], &first)?;
+        let second = selection::values(&runs[1], places[1], &second)?;
         for ((a, b), (draw, _)) in first.iter().zip(&second).zip(pairs) {
             let differ = |i: &usize| a[*i].to_bits() != b[*i].to_bits();
             if let Some(case) = (0..cases).find(differ) {

@@ -4,6 +4,7 @@
 //! returns the exit code. Nothing here computes.
 
 pub mod actuator;
+pub mod campaign;
 pub mod check;
 pub mod compare;
 pub mod completions;
@@ -12,17 +13,21 @@ pub mod gate;
 pub mod how_many;
 pub mod init;
 pub mod interrupt;
+pub mod merge;
 pub mod modes;
 pub mod nominal;
+pub mod part;
 pub mod plan;
 pub mod planar;
 pub mod progress;
 pub mod replay;
+pub mod retry;
 pub mod run;
 pub mod schema;
 pub mod selection;
 pub mod sensitivity;
 pub mod statistics;
+pub mod status;
 pub mod summary;
 
 pub use error::Error;
@@ -59,6 +64,9 @@ enum Command {
     Modes(modes::Args),
     Nominal(nominal::Args),
     Run(run::Args),
+    Merge(merge::Args),
+    Status(status::Args),
+    Retry(retry::Args),
     Summary(summary::Args),
     Statistics(statistics::Args),
     Sensitivity(sensitivity::Args),
@@ -116,6 +124,9 @@ pub fn run() -> ExitCode {
         Command::Modes(args) => modes::run(args, &mut out),
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),
+        Command::Merge(args) => merge::run(args, &mut out),
+        Command::Status(args) => status::run(args, &mut out),
+        Command::Retry(args) => retry::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),
         Command::Statistics(args) => statistics::run(args, &mut out),
         Command::Sensitivity(args) => sensitivity::run(args, &mut out),

@@ -38,7 +38,12 @@ pub fn columns(run: &Run, asked: &[String]) -> Result<Vec<String>, Error> {
 /// The values of columns of the table `cases` by case, NaN where a case failed.
 pub fn values(run: &Run, population: usize, names: &[String]) -> Result<Vec<Vec<f64>>, Error> {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    Ok(run.numbers(population, &names)?)
+    let mut columns = vec![Vec::new(); names.len()];
+    run.cases(population, &names, |_, values, _| {
+        columns.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
+        Ok(())
+    })?;
+    Ok(columns)
 }
 
 /// Writes a table to a new file, if one is asked for.

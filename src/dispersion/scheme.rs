@@ -142,6 +142,27 @@ impl Scheme {
         }
     }
 
+    /// Whether a finished run can be extended by `more` cases, with so many draw keys.
+    ///
+    /// # Errors
+    /// A scheme whose first cases would change, or of another number of cases at once.
+    pub fn check_extension(&self, more: u64, draws: u64) -> Result<(), Refusal> {
+        if !self.keeps_first_cases() {
+            let allowed = "a run whose plan keeps its first cases when their number grows: \
+                           independent draws, Sobol, nested or Saltelli";
+            return refuse("plan", self.describe(), allowed);
+        }
+        let at_once = match self {
+            Self::Nested { inner, .. } => *inner,
+            Self::Saltelli => draws + 2,
+            _ => self.replicates(),
+        };
+        if more.is_multiple_of(at_once) {
+            return Ok(());
+        }
+        refuse("cases", format!("{more} more"), format!("a multiple of {at_once}"))
+    }
+
     /// Whether the number of cases is not free.
     pub fn has_own_cases(&self) -> bool {
         matches!(self, Self::OneAtATime { .. } | Self::Corners { .. } | Self::File)

@@ -6,19 +6,24 @@
 use super::column::Column;
 use crate::campaign::Population;
 use crate::campaign::metric::metrics;
+use crate::campaign::nested::Statement;
 use crate::campaign::outline::{Outline, StoredPoles};
 use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
 use crate::campaign::row::{CaseRow, ModeRow};
 use crate::campaign::sample::Intervals;
-use crate::campaign::summary::{LEVELS, Spread, Statement, SummaryRow, WorstRow};
+use crate::campaign::summary::{LEVELS, Spread, SummaryRow, WorstRow};
+use crate::dynamics::Part;
 use arrow::datatypes::Field;
 use std::sync::Arc;
 
 /// Version of the tables' columns and metadata; a change of either raises it.
 pub const VERSION: u32 = 2;
 
-/// Cases in a row group of the `cases` table, and the most in one of `modes`.
-const MOST_GROUP_CASES: u64 = 1024;
+/// Most cases in a row group.
+const MOST_GROUP_CASES: u64 = 8192;
+/// Cells of a row group of the `cases` table are kept near this number: few row groups, since the
+/// footer that tells of them is held in memory, and small ones, since each is too.
+const GROUP_CELLS: u64 = 1 << 20;
 /// Rows of a row group of the `modes` table are kept near this number.
 const GROUP_ROWS: u64 = 128 << 10;
 /// Poles of an evaluation reckoned with where all are stored.
@@ -43,6 +48,9 @@ impl TableName {
     /// Every table, in the order of writing.
     pub const ALL: [Self; 5] =
         [Self::Cases, Self::Modes, Self::Summary, Self::Worst, Self::Columns];
+
+    /// The tables that follow the cases, case by case; the others are made from them.
+    pub const OF_CASES: [Self; 2] = [Self::Cases, Self::Modes];
 
     /// The word in file names.
     pub fn name(self) -> &'static str {
@@ -77,10 +85,11 @@ impl TableName {
     /// Cases in a full row group, where the table follows the cases; a power of two, so that
     /// boundaries of all tables and of shards coincide. Fixed by the outline.
     pub fn group_cases(self, outline: &Outline) -> u64 {
-        if self != Self::Modes {
-            return MOST_GROUP_CASES;
-        }
         let definition = &outline.definition;
+        if self != Self::Modes {
+            let columns = (metrics(definition).len() + 2 * outline.draws.len() + 4) as u64;
+            return 1 << (GROUP_CELLS / columns).clamp(1, MOST_GROUP_CASES).ilog2();
+        }
         let poles = match outline.poles {
             StoredPoles::Named => definition.modes.len() as u64,
             StoredPoles::All => ALL_POLES,
@@ -209,6 +218,17 @@ fn draws(outline: &Outline) -> Vec<Column<CaseRow>> {
     columns
 }
 
+/// The column of the `modes` table with the participation of a part.
+pub fn participation_name(part: Part) -> &'static str {
+    match part {
+        Part::RigidBody => "participation_rigid_body",
+        Part::Structure => "participation_structure",
+        Part::Nozzle => "participation_nozzle",
+        Part::Slosh => "participation_slosh",
+        Part::Servo => "participation_servo",
+    }
+}
+
 /// Columns of the `modes` table.
 pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
     let times = outline.definition.flight_times_s.clone();
@@ -217,7 +237,7 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
             r.outcome.as_ref().ok().and_then(get)
         })
     };
-    vec![
+    let mut columns = vec![
         population(outline, |r: &ModeRow| r.population),
         Column::count("case", "Case index inside the population", |r: &ModeRow| {
             Some(r.case as i64)
@@ -237,10 +257,15 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
                 BRANCHES.iter().position(|other| *other == branch)
             },
         ),
+        Column::count(
+            "null_poles",
+            "Poles at the origin of this model, known by construction and not solved for",
+            |r: &ModeRow| Some(r.null_poles as i64),
+        ),
         Column::text(
             "label",
-            "Modal label the pole carries; for other poles that of the elastic mode with more than \
-             half of the participation, if any",
+            "Modal label the pole carries; for other poles the mode, rigid motion (axial, roll, pitch, \
+             yaw), nozzle, tank or servo with more than half of the participation, if any",
             |r: &ModeRow| r.outcome.as_ref().ok()?.label.as_deref(),
         ),
         number("pole_re_rad_s", "rad/s", "Real part of the pole; NULL if failed", |p| {
@@ -268,18 +293,16 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
              1; where two poles exchange character the path decides, not this number",
             |p| p.identity_confidence,
         ),
-        number(
-            "participation_structure",
+    ];
+    for (index, part) in Part::ALL.into_iter().enumerate() {
+        columns.push(Column::number(
+            participation_name(part),
             "1",
-            "Real part of the sum of the participation factors of the elastic states; may leave 0 to 1",
-            |p| p.participation_structure,
-        ),
-        number(
-            "participation_nozzle",
-            "1",
-            "Real part of the sum of the participation factors of the gimbal states; may leave 0 to 1",
-            |p| p.participation_nozzle,
-        ),
+            "Real part of the sum of the participation factors of the states of this part; may leave 0 to 1",
+            move |r: &ModeRow| Some(r.outcome.as_ref().ok()?.participation?[index]),
+        ));
+    }
+    columns.extend([
         number("residual", "1", "Relative residual of the eigenpair", |p| p.residual),
         Column::word("status", "ok, or the kind of failure", statuses(), |r: &ModeRow| {
             Some(status(r.outcome.as_ref().err()))
@@ -287,7 +310,8 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
         Column::text("failure_message", "What the failure says", |r: &ModeRow| {
             r.outcome.as_ref().err().map(|f| f.message.as_str())
         }),
-    ]
+    ]);
+    columns
 }
 
 /// Columns of the `summary` table.

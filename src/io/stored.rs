@@ -6,11 +6,31 @@ use super::run::Run;
 use super::schema::{self, TableName};
 use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
 use crate::campaign::row::ModeRow;
+use crate::dynamics::Part;
 use crate::problem::Problems;
 use arrow::array::{Array, AsArray};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 use arrow::record_batch::RecordBatch;
 use nalgebra::Complex;
+
+/// The pole of a named mode in a row of the `modes` table; none if the evaluation failed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PoleRow {
+    /// Case index.
+    pub case: u64,
+    /// Index of the variant.
+    pub variant: usize,
+    /// Index of the flight time.
+    pub flight_time: usize,
+    /// Index of the named mode.
+    pub mode: usize,
+    /// The pole, rad/s.
+    pub pole: Option<Complex<f64>>,
+}
+
+/// Columns that [`Run::pole_rows`] reads.
+pub(super) const POLE_COLUMNS: [&str; 6] =
+    ["case", "variant", "flight_time_s", "mode", "pole_re_rad_s", "pole_im_rad_s"];
 
 impl Run {
     /// A column of words by their indices.
@@ -39,6 +59,40 @@ impl Run {
         (0..batch.num_rows()).map(index).collect()
     }
 
+    /// The poles of a batch of the `modes` table that belong to named modes.
+    pub(super) fn pole_rows(&self, batch: &RecordBatch) -> Result<Vec<PoleRow>, Problems> {
+        let definition = &self.outline().definition;
+        let column = |name: &str| batch.column_by_name(name).expect("a column of the registry");
+        let words = |name: &str, words: &[&str]| self.words(TableName::Modes, batch, name, words);
+        let number = |name: &str| column(name).as_primitive::<Float64Type>();
+        let variants: Vec<&str> = definition.variants.iter().map(|v| v.name.as_str()).collect();
+        let modes: Vec<&str> = definition.modes.iter().map(String::as_str).collect();
+        let (variant, mode) = (words("variant", &variants)?, words("mode", &modes)?);
+        let case = column("case").as_primitive::<Int64Type>();
+        let (re, im) = (number("pole_re_rad_s"), number("pole_im_rad_s"));
+        let time = number("flight_time_s");
+        let times = &definition.flight_times_s;
+        let mut rows = Vec::with_capacity(batch.num_rows());
+        for row in 0..batch.num_rows() {
+            let flight_time = times
+                .iter()
+                .position(|t| time.is_valid(row) && t.to_bits() == time.value(row).to_bits());
+            let (Some(variant), Some(flight_time), true) =
+                (variant[row], flight_time, case.is_valid(row))
+            else {
+                let allowed = "case, variant and time";
+                return Err(self.damage(TableName::Modes, "a row of no evaluation", allowed));
+            };
+            if let Some(mode) = mode[row] {
+                let whole = re.is_valid(row) && im.is_valid(row);
+                let pole = whole.then(|| Complex::new(re.value(row), im.value(row)));
+                let case = case.value(row) as u64;
+                rows.push(PoleRow { case, variant, flight_time, mode, pole });
+            }
+        }
+        Ok(rows)
+    }
+
     /// The rows of a batch of the `modes` table, every column read.
     pub(super) fn mode_rows(&self, batch: &RecordBatch) -> Result<Vec<ModeRow>, Problems> {
         let definition = &self.outline().definition;
@@ -55,6 +109,7 @@ impl Run {
         let status = words("status", &schema::statuses().collect::<Vec<_>>())?;
         let case = column("case").as_primitive::<Int64Type>();
         let time = column("flight_time_s").as_primitive::<Float64Type>();
+        let null_poles = column("null_poles").as_primitive::<Int64Type>();
         let (label, message) = (column("label"), column("failure_message"));
         let text = |array: &dyn Array, row: usize| {
             let array = array.as_string::<i32>();
@@ -63,6 +118,13 @@ impl Run {
         let number = |name: &str, row: usize| {
             let array = column(name).as_primitive::<Float64Type>();
             array.is_valid(row).then(|| array.value(row))
+        };
+        let participation = |row: usize| {
+            let mut shares = [0.0; Part::ALL.len()];
+            for (share, part) in shares.iter_mut().zip(Part::ALL) {
+                *share = number(schema::participation_name(part), row)?;
+            }
+            Some(shares)
         };
         let mut rows = Vec::with_capacity(batch.num_rows());
         for row in 0..batch.num_rows() {
@@ -89,8 +151,7 @@ impl Run {
                         label: text(label, row),
                         value: Complex::new(re, im),
                         identity_confidence: number("identity_confidence", row),
-                        participation_structure: number("participation_structure", row),
-                        participation_nozzle: number("participation_nozzle", row),
+                        participation: participation(row),
                         residual: number("residual", row),
                     })
                 }
@@ -101,8 +162,16 @@ impl Run {
                 None => return Err(damage("a row without a status", "ok or a failure")),
             };
             let case = case.value(row) as u64;
-            let mode = mode[row];
-            rows.push(ModeRow { population, case, variant, flight_time, mode, outcome });
+            let (mode, null_poles) = (mode[row], null_poles.value(row) as usize);
+            rows.push(ModeRow {
+                population,
+                case,
+                variant,
+                flight_time,
+                null_poles,
+                mode,
+                outcome,
+            });
         }
         Ok(rows)
     }

@@ -1,5 +1,9 @@
 //! Scenario: from the text of the input files to validated values, with all problems at once.
 
+pub mod actuator;
+pub mod aerodynamics;
+pub mod autopilot;
+pub mod autopilot_file;
 pub mod dispersion;
 #[cfg(test)]
 mod fixture;
@@ -11,6 +15,7 @@ pub mod run;
 pub mod run_file;
 pub mod schema;
 pub mod table;
+pub mod tank;
 pub mod vehicle;
 pub mod vehicle_file;
 

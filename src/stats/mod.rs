@@ -17,6 +17,7 @@ mod proportion;
 mod quantile;
 mod replicates;
 mod root;
+mod selection;
 pub mod sensitivity;
 mod student;
 mod tolerance;
@@ -26,12 +27,13 @@ pub use convergence::{checkpoints, running};
 pub use drawing::{Drawing, Independent};
 pub use error::Error;
 pub use estimate::{Estimate, Method, Sides};
-pub use moments::Moments;
+pub use moments::{Moments, RunningMoments};
 pub use paired::PairedDifference;
 pub use probability::{Confidence, Probability};
 pub use proportion::{clopper_pearson, rejects_at_least, rejects_at_most};
-pub use quantile::Ordered;
+pub use quantile::{Ordered, interval_ranks, quantile_of};
 pub use replicates::of_replicates;
+pub use selection::Selection;
 pub use tolerance::{
     Tails, ToleranceBound, ToleranceInterval, consumers_risk, least_cases, most_exceedances,
     tolerance_bound, tolerance_interval,
