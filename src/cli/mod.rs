@@ -6,6 +6,7 @@
 pub mod actuator;
 pub mod campaign;
 pub mod check;
+pub mod compare;
 pub mod completions;
 pub mod error;
 pub mod gate;
@@ -24,6 +25,9 @@ pub mod replay;
 pub mod retry;
 pub mod run;
 pub mod schema;
+pub mod selection;
+pub mod sensitivity;
+pub mod statistics;
 pub mod status;
 pub mod summary;
 
@@ -66,6 +70,9 @@ enum Command {
     Status(status::Args),
     Retry(retry::Args),
     Summary(summary::Args),
+    Statistics(statistics::Args),
+    Sensitivity(sensitivity::Args),
+    Compare(compare::Args),
     Gate(gate::Args),
     Replay(replay::Args),
     HowMany(how_many::Args),
@@ -124,6 +131,9 @@ pub fn run() -> ExitCode {
         Command::Status(args) => status::run(args, &mut out),
         Command::Retry(args) => retry::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),
+        Command::Statistics(args) => statistics::run(args, &mut out),
+        Command::Sensitivity(args) => sensitivity::run(args, &mut out),
+        Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),

@@ -8,6 +8,7 @@ pub mod flat;
 pub mod folder;
 pub mod import;
 pub mod inputs;
+pub mod listed;
 pub mod lock;
 pub mod maker;
 pub mod manifest;
