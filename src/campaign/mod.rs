@@ -6,6 +6,7 @@ pub mod draw;
 pub mod evaluator;
 pub mod metric;
 pub mod outline;
+pub mod planar;
 pub mod plant;
 pub mod pool;
 pub mod record;

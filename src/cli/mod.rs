@@ -24,6 +24,7 @@ pub mod retry;
 pub mod run;
 pub mod schema;
 pub mod status;
+pub mod submit;
 pub mod summary;
 
 pub use error::Error;
@@ -62,6 +63,7 @@ enum Command {
     Run(run::Args),
     Merge(merge::Args),
     Status(status::Args),
+    Submit(submit::Args),
     Retry(retry::Args),
     Summary(summary::Args),
     Gate(gate::Args),
@@ -119,6 +121,7 @@ pub fn run() -> ExitCode {
         Command::Run(args) => run::run(args, &mut out),
         Command::Merge(args) => merge::run(args, &mut out),
         Command::Status(args) => status::run(args, &mut out),
+        Command::Submit(args) => submit::run(args, &mut out),
         Command::Retry(args) => retry::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),

@@ -132,6 +132,14 @@ pub fn remove(path: &Path) -> Result<(), Problems> {
     }
 }
 
+/// A path that does not depend on the current folder.
+///
+/// # Errors
+/// One problem if the current folder is not known.
+pub fn absolute(path: &Path) -> Result<PathBuf, Problems> {
+    std::path::absolute(path).map_err(|e| problem(path, &e, "a path"))
+}
+
 /// What the name of a file written aside begins with.
 pub const ASIDE: &str = ".aside-";
 
