@@ -15,6 +15,7 @@ pub mod interrupt;
 pub mod merge;
 pub mod modes;
 pub mod nominal;
+pub mod outside;
 pub mod part;
 pub mod plan;
 pub mod planar;

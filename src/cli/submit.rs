@@ -81,6 +81,8 @@ pub struct Args {
     /// Shows the state of the jobs and of the run
     #[arg(long)]
     status: bool,
+    #[command(flatten)]
+    outside: super::outside::Args,
 }
 
 /// What is remembered of a submission.
@@ -162,7 +164,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
 
 /// Shards and threads from a timing probe.
 fn plan(args: &Args, out: &mut dyn Write) -> Result<Submitted, Error> {
-    let mut loaded = io::scenario::load(&args.run)?;
+    let mut loaded = io::scenario::load(&args.run, args.outside.reach())?;
     if let Some(cases) = args.cases {
         loaded.definition.set_cases(cases);
     }
@@ -247,6 +249,10 @@ impl Scripts<'_> {
         let mut scripts = Vec::new();
         if !tasks.is_empty() {
             let cases = self.args.cases.map_or(String::new(), |cases| format!(" --cases {cases}"));
+            let outside = match self.args.outside.reach() {
+                io::scenario::Reach::Study => "",
+                io::scenario::Reach::Anywhere => " --allow-outside",
+            };
             let options = [
                 format!("--array={}", ranges(tasks)),
                 format!("--cpus-per-task={threads}"),
@@ -255,7 +261,7 @@ impl Scripts<'_> {
                 "--signal=B:TERM@60".to_owned(),
             ];
             let command = format!(
-                "{program} run {run} --output {output} --jobs {threads}{cases} \
+                "{program} run {run} --output {output} --jobs {threads}{cases}{outside} \
                  --shard-from-env --shards {shards} --progress json"
             );
             scripts.push(self.script("array.sh", &options, &command, None));

@@ -101,6 +101,11 @@ pub const PARENTS: Layout = Layout {
         Column("overlap", Holds::Number("1"), "Squared mass-weighted overlap of the shapes"),
     ],
 };
+/// Layouts of the tables.
+pub fn layouts() -> [&'static Layout; 5] {
+    LAYOUTS
+}
+
 const LAYOUTS: [&Layout; 5] = [&GRIDS, &MODES, &SHAPES, &MASS, &PARENTS];
 
 /// `package.toml`.

@@ -7,8 +7,11 @@
 mod answers;
 mod bad_input;
 mod commands;
+mod corpus;
 mod damage;
 mod failures;
+mod outside;
+mod parsers;
 mod repeatability;
 mod schema;
 mod stopping;
