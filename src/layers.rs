@@ -11,7 +11,7 @@ const LAYERS: [&[&str]; 9] = [
     &["problem", "spelling", "stats"],
     &["vehicle"],
     &["dynamics", "dispersion", "structure", "fem"],
-    &["modal"],
+    &["modal", "import"],
     &["campaign"],
     &["gate"],
     &["scenario", "report"],

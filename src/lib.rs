@@ -14,6 +14,7 @@ pub mod dispersion;
 pub mod dynamics;
 pub mod fem;
 pub mod gate;
+pub mod import;
 pub mod io;
 pub mod modal;
 pub mod problem;

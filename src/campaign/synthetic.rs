@@ -3,9 +3,10 @@
 //! No physics: the numbers only have to be unlike each other and to include failures, unstable
 //! poles and pairs of poles that exchange character.
 
-use super::definition::{Definition, NozzleJet, Population, Slope, Variant};
+use super::definition::{Definition, Feedback, NozzleJet, Population, Slope, Variant};
 use super::outline::{DrawColumn, Input, Outline, StoredPoles};
 use super::record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};
+use crate::dispersion::Scheme;
 use nalgebra::Complex;
 
 /// A definition with two variants, two flight times, two modes and the given numbers of cases.
@@ -20,6 +21,8 @@ pub fn definition(cases: &[u64]) -> Definition {
         rigid_body: false,
         slosh: false,
         aerodynamics: false,
+        feedback: Feedback::Open,
+        actuators: None,
     };
     let names = ["nominal", "dispersed", "corner_dispersed"];
     let population = |(index, &cases): (usize, &u64)| Population {
@@ -27,6 +30,7 @@ pub fn definition(cases: &[u64]) -> Definition {
         cases,
         fixed: if index == 2 { vec![(1, 0.0025)] } else { Vec::new() },
         drawn: index > 0,
+        scheme: Scheme::MonteCarlo,
     };
     Definition {
         name: "synthetic".to_owned(),

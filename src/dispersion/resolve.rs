@@ -2,10 +2,11 @@
 //!
 //! Raw types belong to `table`; the result is a [`Dispersion`].
 
+use super::correlation::{Group, Offender};
 use super::draw::{Dispersion, Draw, Role, Shared, name_columns};
 use super::law::Law;
 use super::parameter::{Domain, Parameter, Parameters, Place, Quantity, Scope};
-use super::table::{Apply, Common, Row, Table};
+use super::table::{Apply, Class, Common, Correlation, Row, Table};
 use crate::spelling;
 use crate::vehicle::{Bearing, Vehicle};
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,10 +22,22 @@ enum Level {
     Actuator,
     Tank,
     Mode,
+    Sensor,
+    Path,
+    Filter,
 }
 
 impl Level {
-    const ALL: [Self; 5] = [Self::Vehicle, Self::Engine, Self::Actuator, Self::Tank, Self::Mode];
+    const ALL: [Self; 8] = [
+        Self::Vehicle,
+        Self::Engine,
+        Self::Actuator,
+        Self::Tank,
+        Self::Mode,
+        Self::Sensor,
+        Self::Path,
+        Self::Filter,
+    ];
 
     fn name(self) -> &'static str {
         match self {
@@ -33,6 +46,9 @@ impl Level {
             Self::Actuator => "actuator",
             Self::Tank => "tank",
             Self::Mode => "mode",
+            Self::Sensor => "sensor",
+            Self::Path => "path",
+            Self::Filter => "filter",
         }
     }
 
@@ -43,15 +59,19 @@ impl Level {
             Self::Engine => matches!(scope, Scope::Engine | Scope::Actuator | Scope::Gimbal),
             Self::Actuator => scope == Scope::Actuator,
             Self::Tank => scope == Scope::Tank,
-            Self::Mode => matches!(scope, Scope::Mode | Scope::Gimbal),
+            Self::Mode => matches!(scope, Scope::Mode | Scope::Gimbal | Scope::SensorMode),
+            Self::Sensor => matches!(scope, Scope::Sensor | Scope::SensorMode),
+            Self::Path => matches!(scope, Scope::Path | Scope::Filter),
+            Self::Filter => scope == Scope::Filter,
         }
     }
 
     /// Whether a wildcard in this place of a template is expanded to the instance.
     fn expands(self, segment: &str) -> bool {
         match segment {
-            "<group>" | "<engine>" => self != Self::Vehicle,
+            "<group>" | "<engine>" | "<sensor>" | "<path>" => self != Self::Vehicle,
             "<actuator>" => self == Self::Actuator,
+            "<filter>" => self == Self::Filter,
             "<tank>" => self == Self::Tank,
             "<label>" => self == Self::Mode,
             _ => false,
@@ -65,8 +85,9 @@ impl Level {
 pub fn resolve(table: &Table, vehicle: &Vehicle, report: Report) -> Dispersion {
     let parameters = Parameters::of(vehicle);
     let mut draws = commons(&table.common, report);
-    let common: BTreeMap<&str, String> =
-        table.common.iter().map(|c| (c.id.as_str(), common_key(&c.id))).collect();
+    let common: BTreeMap<&str, Class> =
+        table.common.iter().map(|c| (c.id.as_str(), c.class)).collect();
+    let mut sound = true;
     let mut owners: BTreeMap<String, usize> = BTreeMap::new();
     let mut absolutes: BTreeMap<usize, usize> = BTreeMap::new();
     // Which draw takes part in which common score, by key until the draws are in order.
@@ -86,7 +107,10 @@ pub fn resolve(table: &Table, vehicle: &Vehicle, report: Report) -> Dispersion {
             at("id", quoted(row.id.as_deref()), NAME.into());
         }
         let shares = shares(row, &common, &mut at);
-        let Some(matched) = matching(row, vehicle, &parameters, &mut at) else { continue };
+        let Some(matched) = matching(row, vehicle, &parameters, &mut at) else {
+            sound = false;
+            continue;
+        };
         let level = level(row, &matched, vehicle, &mut at);
         let quantity = matched.quantity;
         let unit = if row.apply == Apply::Scale { "1" } else { quantity.definition().unit };
@@ -98,7 +122,10 @@ pub fn resolve(table: &Table, vehicle: &Vehicle, report: Report) -> Dispersion {
         if let Ok(law) = &law {
             check_values(row, law, quantity, &mut at);
         }
-        let (Ok(law), Some(level)) = (law, level) else { continue };
+        let (Ok(law), Some(level)) = (law, level) else {
+            sound = false;
+            continue;
+        };
         let mut keys: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for target in targets {
             let key = draw_key(row, level, &parameters, &parameters.all()[target]);
@@ -128,6 +155,8 @@ pub fn resolve(table: &Table, vehicle: &Vehicle, report: Report) -> Dispersion {
                 source: row.source.clone(),
                 law: law.clone(),
                 worst: row.worst,
+                class: row.class,
+                dimension: draws.len(),
                 role: Role::Value { apply: row.apply, common: None, targets },
             });
         }
@@ -144,7 +173,9 @@ pub fn resolve(table: &Table, vehicle: &Vehicle, report: Report) -> Dispersion {
         }
     }
     name_columns(&mut draws);
-    Dispersion::new(parameters, draws)
+    // Keys of rows that could not be read would only seem to be unknown.
+    let groups = if sound { groups(&table.correlation, &draws, report) } else { Vec::new() };
+    Dispersion::new(parameters, draws, groups)
 }
 
 const NAME: &str = "letters, digits, `_` and `-`";
@@ -185,6 +216,8 @@ fn commons(commons: &[Common], report: Report) -> Vec<Draw> {
             source: common.source.clone(),
             law: Law::standard_normal(),
             worst: None,
+            class: common.class,
+            dimension: draws.len(),
             role: Role::Common,
         });
     }
@@ -194,16 +227,20 @@ fn commons(commons: &[Common], report: Report) -> Vec<Draw> {
 /// The common score in which a row takes part, and its weight.
 fn shares(
     row: &Row,
-    common: &BTreeMap<&str, String>,
+    common: &BTreeMap<&str, Class>,
     at: &mut dyn FnMut(&str, String, String),
 ) -> Option<(String, f64)> {
     match (&row.common, row.common_weight) {
         (None, None) => None,
         (Some(id), Some(weight)) => {
-            if !common.contains_key(id.as_str()) {
+            let Some(class) = common.get(id.as_str()) else {
                 let declared = spelling::allowed_instead(id, common.keys().copied());
                 at("common", quoted(Some(id)), format!("the id of a [[common]]: {declared}"));
                 return None;
+            };
+            if *class != row.class {
+                let found = format!("{:?}, the common score being {class:?}", row.class);
+                at("class", found, "the class of the common score".into());
             }
             if !(weight > 0.0 && weight <= 1.0) {
                 at("common_weight", weight.to_string(), "above 0, at most 1".into());
@@ -219,6 +256,95 @@ fn shares(
             None
         }
     }
+}
+
+/// The groups of correlated draws that a table's matrices say.
+fn groups(correlations: &[Correlation], draws: &[Draw], report: Report) -> Vec<Group> {
+    let mut owners: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut groups = Vec::new();
+    for (number, correlation) in correlations.iter().enumerate() {
+        let mut sound = true;
+        let mut at = |key: &str, found: String, allowed: &str| {
+            sound = false;
+            report(format!("correlation[{number}].{key}"), found, allowed.into());
+        };
+        if correlation.source.trim().is_empty() {
+            at("source", "an empty text".into(), "the source of the numbers");
+        }
+        let mut members = Vec::new();
+        for (i, key) in correlation.keys.iter().enumerate() {
+            let place = format!("keys[{i}]");
+            let Ok(index) = draws.binary_search_by(|d| d.key.as_str().cmp(key)) else {
+                let known = draws.iter().map(|d| d.key.as_str());
+                at(&place, quoted(Some(key)), &spelling::allowed_instead(key, known));
+                continue;
+            };
+            let found = match &draws[index] {
+                Draw { role: Role::Common, .. } => Some("a common score"),
+                Draw { role: Role::Value { common: Some(_), .. }, .. } => {
+                    Some("a key that takes part in a common score")
+                }
+                Draw { law, .. } if !law.is_continuous() => Some("a key of single values"),
+                Draw { class, .. }
+                    if members.first().is_some_and(|m: &usize| draws[*m].class != *class) =>
+                {
+                    Some("a key of another class")
+                }
+                _ => None,
+            };
+            if let Some(found) = found {
+                let allowed = "keys of one class with continuous laws and no common score";
+                at(&place, format!("\"{key}\", {found}"), allowed);
+            }
+            if let Some(owner) = owners.insert(index, number) {
+                let found = format!("\"{key}\", which correlation[{owner}] has too");
+                at(&place, found, "each key once");
+            }
+            members.push(index);
+        }
+        let size = correlation.keys.len();
+        let square = correlation.matrix.len() == size
+            && correlation.matrix.iter().all(|row| row.len() == size);
+        if !square {
+            let rows = correlation.matrix.len();
+            let found = format!("{rows} rows for {size} keys, or rows of another length");
+            at("matrix", found, "as many rows, and numbers in each, as keys");
+            continue;
+        }
+        for (i, row) in correlation.matrix.iter().enumerate() {
+            for (j, r) in row.iter().enumerate() {
+                let (mirror, place) = (correlation.matrix[j][i], format!("matrix[{i}][{j}]"));
+                if i == j && *r != 1.0 {
+                    at(&place, r.to_string(), "1, on the diagonal");
+                } else if i != j && !(r.abs() < 1.0) {
+                    at(&place, r.to_string(), "above −1 and below 1");
+                } else if j > i && *r != mirror {
+                    at(
+                        &place,
+                        format!("{r}, and {mirror} across"),
+                        "the same number on both sides",
+                    );
+                }
+            }
+        }
+        if !sound || members.len() != size {
+            continue;
+        }
+        match Group::new(members, correlation.kind, &correlation.matrix) {
+            Ok(group) => groups.push(group),
+            Err(Offender { pair: [i, j], allowed: [low, high], together }) => {
+                let keys = &correlation.keys;
+                let found = format!(
+                    "{} between `{}` and `{}`: the matrix is not positive definite (already for the \
+                     keys number {together:?})",
+                    correlation.matrix[i][j], keys[i], keys[j]
+                );
+                let allowed = format!("for this pair, the others as they are, {low} < r < {high}");
+                report(format!("correlation[{number}].matrix[{i}][{j}]"), found, allowed);
+            }
+        }
+    }
+    groups
 }
 
 /// The parameters that a row's path names, all of one quantity.
@@ -251,8 +377,8 @@ fn matching(
     let Some(&first) = targets.first() else {
         if let Some(&absent) = named.first() {
             let description = all[absent].quantity.definition().description;
-            let allowed = format!("an engine of the vehicle that has one ({description})");
-            at("path", format!("\"{}\", which no engine has", row.path), allowed);
+            let allowed = format!("a part of the vehicle that has one ({description})");
+            at("path", format!("\"{}\", which no part has", row.path), allowed);
         } else {
             at("path", quoted(Some(&row.path)), alternatives(&row.path, vehicle, parameters));
         }
@@ -270,9 +396,10 @@ fn alternatives(path: &str, vehicle: &Vehicle, parameters: &Parameters) -> Strin
     let mut candidates: BTreeSet<String> =
         parameters.all().iter().filter(|p| p.exists).map(|p| p.path.clone()).collect();
     for definition in Quantity::ALL.iter().map(|q| q.definition()) {
-        let wild = ["<engine>", "<actuator>", "<label>"]
-            .iter()
-            .fold(definition.path.to_string(), |path, segment| path.replace(segment, "*"));
+        let wild =
+            ["<engine>", "<actuator>", "<label>", "<sensor>", "<path>", "<filter>", "<tank>"]
+                .iter()
+                .fold(definition.path.to_string(), |path, segment| path.replace(segment, "*"));
         candidates.extend(groups.iter().map(|group| wild.replace("<group>", group)));
     }
     let mut near = Vec::new();
@@ -284,7 +411,11 @@ fn alternatives(path: &str, vehicle: &Vehicle, parameters: &Parameters) -> Strin
         let next = next.to_string();
         candidates.remove(&next);
     }
-    let templates: Vec<&str> = Quantity::ALL.iter().map(|q| q.definition().path).collect();
+    let held = |quantity: &Quantity| {
+        parameters.all().iter().any(|parameter| parameter.exists && parameter.quantity == *quantity)
+    };
+    let templates: Vec<&str> =
+        Quantity::ALL.iter().filter(|q| held(q)).map(|q| q.definition().path).collect();
     let asked = match near.as_slice() {
         [] => String::new(),
         near => format!("did you mean {}? ", near.join(" or ")),
@@ -324,7 +455,8 @@ fn in_band(
     at: &mut dyn FnMut(&str, String, String),
 ) -> Vec<usize> {
     let Some([low, high]) = row.band_hz else { return matched.targets.clone() };
-    if !matches!(matched.quantity.definition().scope, Scope::Mode | Scope::Gimbal) {
+    let scope = matched.quantity.definition().scope;
+    if !matches!(scope, Scope::Mode | Scope::Gimbal | Scope::SensorMode) {
         at("band_hz", format!("[{low}, {high}]"), "no band: the path has no modal label".into());
         return matched.targets.clone();
     }
@@ -365,7 +497,8 @@ fn check_bearing(
         .map(|&target| &parameters.all()[target])
         .filter(|parameter| match parameter.place {
             Place::Engine(e) => {
-                vehicle.engines[e].actuators.iter().all(|a| a.bearing == Bearing::Included)
+                let mut pairs = vehicle.engines[e].sets();
+                pairs.all(|(_, pair)| pair.iter().all(|a| a.bearing == Bearing::Included))
             }
             _ => false,
         })

@@ -2,12 +2,15 @@
 //!
 //! Types and ranges of single values are checked before, by `table`.
 
-use super::run_file::{CornerFile, NozzleJetFile, RunFile, SignsFile, SlopeFile, VariantFile};
+use super::run_file::{
+    CornerFile, FeedbackFile, NozzleJetFile, RunFile, SignsFile, SlopeFile, VariantFile,
+};
 use super::table::Findings;
 use super::vehicle::Resolved;
-use super::{names, pattern};
+use super::{names, pattern, plan};
+use crate::campaign::definition::Feedback;
 use crate::campaign::{Definition, NozzleJet, Population, Slope, Variant};
-use crate::dispersion::Dispersion;
+use crate::dispersion::{Dispersion, Draw, Listed, Scheme};
 use crate::problem::Problems;
 use crate::spelling::allowed_instead;
 
@@ -49,7 +52,8 @@ pub struct Run {
 const STANDARD: [&str; 2] = ["nominal", "dispersed"];
 
 /// Checks what the values of `file` mean together and with its vehicle and dispersion. Without
-/// those (where they could not be read, which `findings` knows) the rest is still checked.
+/// those (where they could not be read, which `findings` knows) the rest is still checked. `listed`
+/// are the cases of its plan file.
 ///
 /// # Errors
 /// All problems of the file.
@@ -58,6 +62,7 @@ pub fn resolve(
     name: &str,
     vehicle: Option<&Resolved>,
     dispersion: Option<&Dispersion>,
+    listed: Option<&Listed>,
     mut findings: Findings,
 ) -> Result<Run, Problems> {
     let f = &mut findings;
@@ -69,15 +74,20 @@ pub fn resolve(
     let flight_times_s = flight_times(file, vehicle, f);
     modes(file, vehicle, &flight_times_s, f);
     let gimballed = gimballed(file, vehicle, f);
+    servo(&variants, vehicle, &gimballed, f);
 
-    let standard = |name: &str, cases, drawn| Population {
+    let standard = |name: &str, cases, drawn, scheme| Population {
         name: name.into(),
         cases,
         fixed: Vec::new(),
         drawn,
+        scheme,
     };
-    let mut populations =
-        vec![standard(STANDARD[0], 1, false), standard(STANDARD[1], file.cases, true)];
+    let (scheme, cases) = plan::scheme(file, dispersion, listed, f);
+    let mut populations = vec![
+        standard(STANDARD[0], 1, false, Scheme::MonteCarlo),
+        standard(STANDARD[1], cases, true, scheme),
+    ];
     let mut corners = Vec::new();
     for (i, corner) in file.corner.iter().enumerate() {
         let key = format!("corner[{i}]");
@@ -94,7 +104,8 @@ pub fn resolve(
                 Vec::new()
             }
         };
-        let fixed_case = Population { name: corner.name.clone(), cases: 1, fixed, drawn: false };
+        let fixed_case =
+            Population { fixed, ..standard(&corner.name, 1, false, Scheme::MonteCarlo) };
         if corner.cases > 0 {
             let name = around(&corner.name);
             let cloud = Population { name, cases: corner.cases, drawn: true, ..fixed_case.clone() };
@@ -141,6 +152,12 @@ fn variant(file: &VariantFile) -> Variant {
         rigid_body: file.rigid_body,
         slosh: file.slosh,
         aerodynamics: file.aerodynamics,
+        feedback: match file.feedback {
+            FeedbackFile::Open => Feedback::Open,
+            FeedbackFile::Closed => Feedback::Closed,
+            FeedbackFile::Inverted => Feedback::Inverted,
+        },
+        actuators: file.actuators.clone(),
     }
 }
 
@@ -197,6 +214,33 @@ fn gimballed(file: &RunFile, vehicle: Option<&Resolved>, f: &mut Findings) -> Ve
     paths.iter().map(chosen).collect()
 }
 
+/// Variants name sets of actuators that exist, and close loops that the vehicle has.
+fn servo(variants: &[Variant], vehicle: Option<&Resolved>, gimballed: &[bool], f: &mut Findings) {
+    let Some(vehicle) = vehicle.map(|v| &v.vehicle) else { return };
+    let sets = vehicle.actuator_sets();
+    for (i, variant) in variants.iter().enumerate() {
+        if let Some(set) = variant.actuators.as_deref().filter(|set| !sets.contains(set)) {
+            let allowed = allowed_instead(set, sets.iter().copied());
+            f.push(format!("variant[{i}].actuators"), format!("\"{set}\""), allowed);
+        }
+        if variant.feedback == Feedback::Open {
+            continue;
+        }
+        let key = format!("variant[{i}].feedback");
+        let Some(autopilot) = &vehicle.autopilot else {
+            f.push(key, "a closed loop on a vehicle without an autopilot", "open");
+            continue;
+        };
+        let mut gimbals = autopilot.allocation.gimbals.iter();
+        if let Some((engine, _)) = gimbals.find(|(engine, _)| !gimballed[*engine]) {
+            let path = vehicle.engines[*engine].path();
+            let found = format!("a loop through the locked engine \"{path}\"");
+            let allowed = "open, or a run that gimbals every engine of the allocation";
+            f.push(key, found, allowed);
+        }
+    }
+}
+
 /// Fixed values of a corner whose signs the file gives, in the order of the draw keys.
 fn given(
     corner: &CornerFile,
@@ -218,8 +262,8 @@ fn given(
         f.push(key, "neither `low` nor `high`", "at least one entry in `low` or `high`");
     }
     let Some(dispersion) = dispersion else { return Vec::new() };
-    let low = matching(dispersion, &corner.low, &format!("{key}.low"), f);
-    let high = matching(dispersion, &corner.high, &format!("{key}.high"), f);
+    let low = matching(dispersion, &corner.low, has_worst, &format!("{key}.low"), f);
+    let high = matching(dispersion, &corner.high, has_worst, &format!("{key}.high"), f);
     let both: Vec<usize> = low.iter().copied().filter(|i| high.contains(i)).collect();
     if let Some(&first) = both.first() {
         let key_of = &dispersion.draws()[first].key;
@@ -233,22 +277,28 @@ fn given(
     fixed
 }
 
-/// Indices of the draws with `worst` values that `entries` name, ascending; an entry is a whole
+/// Whether a draw has `worst` values.
+pub(super) fn has_worst(draw: &Draw) -> bool {
+    draw.worst.is_some()
+}
+
+/// Indices of the draws for which `fits` that `entries` name, ascending; an entry is a whole
 /// key or a pattern of its parameter path.
-fn matching(
+pub(super) fn matching(
     dispersion: &Dispersion,
     entries: &[String],
+    fits: fn(&Draw) -> bool,
     place: &str,
     f: &mut Findings,
 ) -> Vec<usize> {
     let names = |entry: &str, key: &str| {
         key == entry || pattern::matches(entry, key.split(" @ ").next().unwrap_or(key))
     };
-    let adverse = || dispersion.draws().iter().enumerate().filter(|(_, d)| d.worst.is_some());
+    let adverse = || dispersion.draws().iter().enumerate().filter(|(_, d)| fits(d));
     for (i, entry) in entries.iter().enumerate() {
         if !adverse().any(|(_, draw)| names(entry, &draw.key)) {
             let allowed = allowed_instead(entry, adverse().map(|(_, d)| d.key.as_str()));
-            let found = format!("\"{entry}\", which matches no draw key with `worst` values");
+            let found = format!("\"{entry}\", which matches no draw key that can stand there");
             f.push(format!("{place}[{i}]"), found, allowed);
         }
     }
@@ -286,7 +336,7 @@ fn evaluated(
     let variant = index("variant", &corner.variant, variants);
     let dispersion = dispersion?;
     let draws = match &corner.keys {
-        Some(entries) => matching(dispersion, entries, &format!("{key}.keys"), f),
+        Some(entries) => matching(dispersion, entries, has_worst, &format!("{key}.keys"), f),
         None => {
             let all = dispersion.draws().iter().enumerate();
             all.filter(|(_, d)| d.worst.is_some()).map(|(i, _)| i).collect()
