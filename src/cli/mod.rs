@@ -6,6 +6,7 @@
 pub mod actuator;
 pub mod campaign;
 pub mod check;
+pub mod compare;
 pub mod completions;
 pub mod error;
 pub mod gate;
@@ -16,6 +17,7 @@ pub mod interrupt;
 pub mod merge;
 pub mod modes;
 pub mod nominal;
+pub mod outside;
 pub mod part;
 pub mod plan;
 pub mod planar;
@@ -24,7 +26,11 @@ pub mod replay;
 pub mod retry;
 pub mod run;
 pub mod schema;
+pub mod selection;
+pub mod sensitivity;
+pub mod statistics;
 pub mod status;
+pub mod submit;
 pub mod summary;
 
 pub use error::Error;
@@ -64,8 +70,12 @@ enum Command {
     Run(run::Args),
     Merge(merge::Args),
     Status(status::Args),
+    Submit(submit::Args),
     Retry(retry::Args),
     Summary(summary::Args),
+    Statistics(statistics::Args),
+    Sensitivity(sensitivity::Args),
+    Compare(compare::Args),
     Gate(gate::Args),
     Replay(replay::Args),
     HowMany(how_many::Args),
@@ -122,8 +132,12 @@ pub fn run() -> ExitCode {
         Command::Run(args) => run::run(args, &mut out),
         Command::Merge(args) => merge::run(args, &mut out),
         Command::Status(args) => status::run(args, &mut out),
+        Command::Submit(args) => submit::run(args, &mut out),
         Command::Retry(args) => retry::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),
+        Command::Statistics(args) => statistics::run(args, &mut out),
+        Command::Sensitivity(args) => sensitivity::run(args, &mut out),
+        Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),

@@ -10,6 +10,7 @@ pub mod nominal;
 mod number;
 pub mod plan;
 pub mod scenario;
+pub mod statistics;
 pub mod story;
 
 pub use number::{percent, significant};

@@ -12,6 +12,7 @@ pub mod import;
 pub mod import_file;
 pub mod names;
 pub mod pattern;
+pub mod plan;
 pub mod run;
 pub mod run_file;
 pub mod schema;
