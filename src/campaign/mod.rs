@@ -8,6 +8,7 @@ pub mod evaluator;
 pub mod metric;
 pub mod nested;
 pub mod outline;
+pub mod planar;
 pub mod plant;
 pub mod pool;
 pub mod record;

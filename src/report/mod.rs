@@ -1,8 +1,10 @@
 //! Reports: values become text for people, terminal tables first.
 
 pub mod actuator;
+pub mod figure;
 pub mod gates;
 pub mod how_many;
+pub mod import;
 pub mod modes;
 pub mod nominal;
 mod number;

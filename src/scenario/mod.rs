@@ -8,6 +8,8 @@ pub mod dispersion;
 #[cfg(test)]
 mod fixture;
 pub mod gimbal;
+pub mod import;
+pub mod import_file;
 pub mod names;
 pub mod pattern;
 pub mod plan;
