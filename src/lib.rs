@@ -14,6 +14,7 @@ pub mod dispersion;
 pub mod dynamics;
 pub mod gate;
 pub mod io;
+pub mod margins;
 pub mod modal;
 pub mod problem;
 pub mod report;
