@@ -11,6 +11,7 @@ pub mod gate;
 pub mod how_many;
 pub mod init;
 pub mod interrupt;
+pub mod margins;
 pub mod modes;
 pub mod nominal;
 pub mod plan;
@@ -60,6 +61,7 @@ enum Command {
     Replay(replay::Args),
     HowMany(how_many::Args),
     Planar(planar::Args),
+    Margins(margins::Args),
     Actuator(actuator::Args),
     Schema(schema::Args),
     Completions(completions::Args),
@@ -114,6 +116,7 @@ pub fn run() -> ExitCode {
         Command::Replay(args) => replay::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),
+        Command::Margins(args) => margins::run(args, &mut out),
         Command::Actuator(args) => actuator::run(args, &mut out),
         Command::Schema(args) => schema::run(args, &mut out),
         Command::Completions(args) => completions::run(args, &mut out),

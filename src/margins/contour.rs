@@ -21,7 +21,7 @@ pub enum Error {
     #[error("more than {MOST_SAMPLES} frequencies would be needed")]
     Effort,
     /// The loops are still large at the highest frequency.
-    #[error("det(1 + G) is {0} at the highest frequency, not yet within 1 of 1")]
+    #[error("det(1 + G) is {0} at the highest frequency: the loops do not die out")]
     Large(Complex<f64>),
 }
 
@@ -45,6 +45,12 @@ const LEAST_DAMPING: f64 = 1e-6;
 
 /// Smallest interval that is halved: relative difference of two frequencies.
 const SMALLEST: f64 = 1e-10;
+
+/// Decades beyond the highest frequency in which loops may still die out.
+const MOST_DECADES_BEYOND: u32 = 6;
+
+/// Distance of det(1 + G) from 1 at which it no longer circles zero.
+const DEAD: f64 = 0.5;
 
 /// The half contour: places 0 to 1 are the quarter circle of radius ε, place `1 + ln(ω/ε)` is jω.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,7 +124,16 @@ pub fn scan(
     let mut samples: Vec<Sample> = Vec::with_capacity(2 * places.len());
     samples.push(sample(places[0])?);
     let mut ahead = Vec::new();
-    for &place in &places[1..] {
+    let step = std::f64::consts::LN_10 / f64::from(settings.points_per_decade);
+    let end = places[places.len() - 1];
+    // Upwards as far as needed for the loops to die out, within reason.
+    let upwards =
+        (1..=MOST_DECADES_BEYOND * settings.points_per_decade).map(|i| end + step * f64::from(i));
+    for place in places[1..].iter().copied().chain(upwards) {
+        let dead = |sample: &Sample| (sample.difference - 1.0).norm() < DEAD;
+        if place > end && samples.last().is_some_and(dead) {
+            break;
+        }
         ahead.push(sample(place)?);
         while let Some(next) = ahead.last() {
             let last = samples[samples.len() - 1];
@@ -137,7 +152,7 @@ pub fn scan(
         }
     }
     let end = samples[samples.len() - 1].difference;
-    if !((end - 1.0).norm() < 1.0) {
+    if !((end - 1.0).norm() < DEAD) {
         return Err(Error::Large(end));
     }
     let phase_deg = phases(&samples);

@@ -26,12 +26,14 @@ pub mod contour;
 pub mod envelope;
 pub mod loops;
 pub mod peak;
+pub mod rational;
 mod search;
 
 pub use assess::{Assessment, AxisMargins, Margin, assess};
 pub use contour::{Curve, Error, scan};
 pub use loops::{AXES, Sample};
 pub use peak::{Peak, Stabilised};
+pub use rational::Rational;
 
 /// Largest gain margin reported, dB: beyond it |L| is not followed from crossing to crossing.
 pub const GAIN_CAP_DB: f64 = 40.0;
@@ -51,7 +53,8 @@ pub struct Settings {
     pub phase_margin_deg: f64,
     /// Radius ε of the contour about zero, Hz; it shrinks to a tenth of the least pole that is not zero.
     pub lowest_hz: f64,
-    /// Upper end of the frequencies, Hz; it grows to twice the highest lightly damped pole.
+    /// Upper end of the frequencies, Hz; it grows to twice the highest lightly damped pole, and to
+    /// where the loops have died out.
     pub highest_hz: f64,
     /// Frequencies a decade before refinement.
     pub points_per_decade: u32,

@@ -7,6 +7,7 @@
 use super::eigen::Error;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::evd::hessenberg::{self, HessenbergParams};
+use faer::linalg::evd::{self, ComputeEigenvectors, EvdParams};
 use faer::linalg::{householder, qr};
 use faer::{Conj, Mat, MatMut, MatRef, Par, Spec};
 use nalgebra::{Complex, DMatrix};
@@ -127,6 +128,33 @@ impl Response {
     /// Inputs m.
     pub fn inputs(&self) -> usize {
         self.direct.ncols()
+    }
+
+    /// The poles, rad/s, one of each complex pair (in the upper half plane).
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn poles(&self) -> Result<Vec<Complex<f64>>, Error> {
+        let n = self.states;
+        let (mut re, mut im) = (vec![0.0; n], vec![0.0; n]);
+        let parameters = Spec::<EvdParams, f64>::default();
+        let no = ComputeEigenvectors::No;
+        let scratch = evd::evd_scratch::<f64>(n, no, no, Par::Seq, parameters);
+        let mut memory = MemBuffer::new(scratch);
+        evd::evd_real(
+            MatRef::from_column_major_slice(&self.columns, n, n),
+            faer::ColMut::from_slice_mut(&mut re).as_diagonal_mut(),
+            faer::ColMut::from_slice_mut(&mut im).as_diagonal_mut(),
+            None,
+            None,
+            Par::Seq,
+            MemStack::new(&mut memory),
+            parameters,
+        )
+        .map_err(|_| Error::NoConvergence)?;
+        // The columns are those of −A.
+        let poles = re.into_iter().zip(im).map(|(re, im)| Complex::new(-re, -im));
+        Ok(poles.filter(|pole| pole.im >= 0.0).collect())
     }
 
     /// The response at the complex frequency `s`, rad/s, written into `response`, p×m.
@@ -296,6 +324,18 @@ mod tests {
             let expected = 1.0 / (s * s) + 1.0 / (s * s + 0.01 * s + 1.0);
             assert!((found[(0, 0)] - expected).norm() < 1e-13 * expected.norm(), "{omega}");
         }
+    }
+
+    #[test]
+    fn poles_come_once_a_pair() {
+        let a = DMatrix::from_row_slice(3, 3, &[0., 1., 0., -4., -0.4, 0., 1., 0., 2.]);
+        let empty = (DMatrix::zeros(3, 0), DMatrix::zeros(0, 3), DMatrix::zeros(0, 0));
+        let response = Response::new(&a, &empty.0, &empty.1, &empty.2).expect("finite");
+        let mut poles = response.poles().expect("solved");
+        poles.sort_by(|a, b| a.re.total_cmp(&b.re));
+        assert_eq!(poles.len(), 2);
+        assert!((poles[0] - Complex::new(-0.2, 3.96_f64.sqrt())).norm() < 1e-14);
+        assert!((poles[1] - Complex::new(2.0, 0.0)).norm() < 1e-14);
     }
 
     #[test]
