@@ -32,6 +32,15 @@ pub struct Variant {
     pub follower_thrust: bool,
     /// Gimbal slope.
     pub slope: Slope,
+    /// Rigid translation and rotation free; off holds them at zero.
+    #[serde(default)]
+    pub rigid_body: bool,
+    /// Slosh masses free; off locks them to their tanks.
+    #[serde(default)]
+    pub slosh: bool,
+    /// Aerodynamic forces on.
+    #[serde(default)]
+    pub aerodynamics: bool,
 }
 
 /// A set of cases evaluated in one run; tables hold populations in this order.

@@ -6,14 +6,17 @@
 
 use super::{Failure, FailureKind};
 use crate::dispersion::{Affine, Parameters, Place, Quantity};
-use crate::dynamics::{DrawnBody, DrawnEngine, DrawnVehicle};
-use crate::vehicle::{Bearing, Engine, ModeSet, STANDARD_GRAVITY_M_S2, Vehicle};
+use crate::dynamics::{DrawnAerodynamics, DrawnBody, DrawnEngine, DrawnTank, DrawnVehicle};
+use crate::vehicle::motor::interpolate;
+use crate::vehicle::{Aerodynamics, Bearing, Engine, ModeSet, STANDARD_GRAVITY_M_S2, Vehicle};
 use std::f64::consts::TAU;
 
 /// Where the parameters of one flight time stand among the effects of a case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slots {
     flight_time_s: f64,
+    /// Nominal mean acceleration, m/s², under which liquids slosh.
+    acceleration_m_s2: f64,
     structural_damping: usize,
     modes: Vec<ModeSlots>,
     engines: Vec<EngineSlots>,
@@ -59,6 +62,7 @@ impl Slots {
         };
         Self {
             flight_time_s: set.flight_time_s,
+            acceleration_m_s2: vehicle.nominal_acceleration_m_s2(set),
             structural_damping: parameters.index(Quantity::StructuralDamping, Place::Vehicle),
             modes,
             engines: (0..vehicle.engines.len())
@@ -91,6 +95,24 @@ impl Slots {
         };
         let common = value(self.structural_damping, vehicle.structural_damping)?;
         self.draw_body(&mut drawn.body, common, &value)?;
+        let whole = |quantity, nominal| value(parameters.index(quantity, Place::Vehicle), nominal);
+        let inertia = [Quantity::RollInertia, Quantity::PitchInertia, Quantity::YawInertia];
+        for (gain, quantity) in drawn.body.inertia_gain.iter_mut().zip(inertia) {
+            *gain = whole(quantity, 1.0)?;
+        }
+        drawn.tanks.clear();
+        for (index, tank) in vehicle.tanks.iter().enumerate() {
+            let of =
+                |quantity, nominal| value(parameters.index(quantity, Place::Tank(index)), nominal);
+            let omega = tank.frequency_rad_s(self.flight_time_s, self.acceleration_m_s2);
+            drawn.tanks.push(DrawnTank {
+                mass_kg: of(Quantity::SloshMass, tank.mass_kg(self.flight_time_s))?,
+                frequency_rad_s: TAU * of(Quantity::SloshFrequency, omega / TAU)?,
+                damping_ratio: of(Quantity::SloshDamping, tank.damping_ratio)?,
+            });
+        }
+        let air = vehicle.aerodynamics.as_ref();
+        drawn.aerodynamics = air.map(|air| self.draw_air(air, &whole)).transpose()?;
         drawn.engines.resize(vehicle.engines.len(), DrawnEngine::default());
         for slots in &self.engines {
             let engine = &vehicle.engines[slots.engine];
@@ -132,6 +154,28 @@ impl Slots {
             body.damping_ratio.push(value(mode.damping, structural_damping)?);
         }
         Ok(())
+    }
+
+    /// Coefficients at the flight condition.
+    fn draw_air(
+        &self,
+        air: &Aerodynamics,
+        of: &impl Fn(Quantity, f64) -> Result<f64, Failure>,
+    ) -> Result<DrawnAerodynamics, Failure> {
+        let draw = |quantity, table: &[f64]| {
+            of(quantity, interpolate(&air.time_s, table, self.flight_time_s))
+        };
+        Ok(DrawnAerodynamics {
+            dynamic_pressure_pa: draw(Quantity::DynamicPressure, &air.dynamic_pressure_pa)?,
+            normal_force_slope_1_rad: draw(
+                Quantity::NormalForceSlope,
+                &air.normal_force_slope_1_rad,
+            )?,
+            center_of_pressure_x_m: draw(Quantity::CenterOfPressure, &air.center_of_pressure_x_m)?,
+            axial_force: draw(Quantity::AxialForce, &air.axial_force)?,
+            pitch_damping: draw(Quantity::PitchDamping, &air.pitch_damping)?,
+            roll_damping: draw(Quantity::RollDamping, &air.roll_damping)?,
+        })
     }
 
     /// ṁ = R_drawn/(Isp_drawn g) · profile_drawn, then any direct row.

@@ -4,9 +4,10 @@
 //! It stores nothing and knows no files; `pool` runs it in parallel.
 
 use super::draw::Slots;
+use super::plant::Extent;
 use super::{Branch, Definition, Evaluation, Failure, FailureKind, Pole, Record, Variant};
 use crate::dispersion::{Affine, Cursor, Dispersion, Sampler};
-use crate::dynamics::{DrawnVehicle, Effects, Model, Plant};
+use crate::dynamics::{DrawnVehicle, Effects, Model, Part, Plant};
 use crate::modal::{self, Reference, Solver, eigen, identify};
 use crate::vehicle::Vehicle;
 use nalgebra::Complex;
@@ -190,7 +191,8 @@ impl<'a> Evaluator<'a> {
                 let buffers = Buffers::of(buffers, plant.layout.coordinates());
                 let outcome =
                     drawn.clone().and_then(|()| self.solve(at, variant, vehicle, buffers, poles));
-                let evaluation = Evaluation { variant, flight_time, outcome };
+                let null_poles = buffers.model.null_states.len();
+                let evaluation = Evaluation { variant, flight_time, null_poles, outcome };
                 look(&View { plant, model: &buffers.model, evaluation: &evaluation });
                 evaluations.push(evaluation);
             }
@@ -291,26 +293,29 @@ fn named_pole(
         label: Some(label.to_owned()),
         value: pair.pole,
         identity_confidence: Some(found.overlap.norm()),
-        participation_structure: Some(found.reference.participation(layout.elastic())),
-        participation_nozzle: Some(found.reference.participation(layout.gimbals())),
+        participation: Some(participation(plant, &found.reference)),
         residual: Some(pair.residual),
     })
 }
 
-/// The row of a pole that belongs to no named mode; it carries the label of the elastic mode with the
-/// largest participation, where that is more than half.
+/// Participation of the states of each part.
+fn participation(plant: &Plant, reference: &Reference) -> [f64; Part::ALL.len()] {
+    Part::ALL.map(|part| reference.participation(plant.layout.part(part)))
+}
+
+/// The row of a pole that belongs to no named mode; it carries the name of the motion with more than
+/// half of the participation, if any.
 fn other_pole(plant: &Plant, reference: &Reference) -> Pole {
-    let layout = &plant.layout;
-    let share = |coordinate: usize| reference.participation(coordinate..coordinate + 1);
-    let dominant = layout.elastic().max_by(|&a, &b| share(a).total_cmp(&share(b)));
+    let motions = plant.layout.motions().into_iter();
+    let shares = motions.map(|(name, members)| (name, reference.participation(members)));
+    let dominant = shares.max_by(|(_, a), (_, b)| a.total_cmp(b));
     Pole {
         mode: None,
         branch: Branch::Other,
-        label: dominant.filter(|&c| share(c) > 0.5).map(|c| layout.label(c).to_owned()),
+        label: dominant.filter(|(_, share)| *share > 0.5).map(|(name, _)| name),
         value: reference.pair.pole,
         identity_confidence: None,
-        participation_structure: Some(reference.participation(layout.elastic())),
-        participation_nozzle: Some(reference.participation(layout.gimbals())),
+        participation: Some(participation(plant, reference)),
         residual: Some(reference.pair.residual),
     }
 }
@@ -344,12 +349,13 @@ fn at_time(
             label.cloned().ok_or_else(|| Error::MissingMode { mode: mode.clone(), time_s })
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let mut slopes = Vec::new();
+    let mut extents = Vec::new();
     let mut plants = Vec::new();
     for variant in &definition.variants {
-        if !slopes.contains(&variant.slope) {
-            slopes.push(variant.slope);
-            plants.push(super::plant::plant(vehicle, set, &definition.gimballed, variant.slope)?);
+        let extent = Extent::of(variant);
+        if !extents.contains(&extent) {
+            extents.push(extent);
+            plants.push(super::plant::plant(vehicle, set, &definition.gimballed, extent)?);
         }
     }
     let parameters = dispersion.parameters();
@@ -362,7 +368,8 @@ fn at_time(
         .variants
         .iter()
         .map(|variant| {
-            let plant = slopes.iter().position(|s| *s == variant.slope).unwrap_or_default();
+            let extent = Extent::of(variant);
+            let plant = extents.iter().position(|e| *e == extent).unwrap_or_default();
             at_variant(&plants[plant], plant, &nominal, variant, &labels).map_err(|(mode, lost)| {
                 Error::Lost {
                     mode: definition.modes[mode].clone(),
@@ -389,6 +396,7 @@ fn at_variant(
         case_jet_damping: variant.case_jet_damping,
         nozzle_jet_damping: variant.nozzle_jet_damping,
         follower_thrust: variant.follower_thrust,
+        aerodynamics: if variant.aerodynamics { 1.0 } else { 0.0 },
     };
     let size = plant.layout.coordinates();
     let mut solver = Solver::new(size);
@@ -396,7 +404,7 @@ fn at_variant(
     for (mode, label) in labels.iter().enumerate() {
         let coordinate = plant.layout.position(label).expect("labels are taken from the mode set");
         let model_at = |factor: f64, model: &mut Model| {
-            plant.assemble(nominal, &Effects { thrust: factor * effects.thrust, ..effects }, model);
+            plant.assemble(nominal, &effects.scaled(factor), model);
         };
         let reference = identify::nominal(&mut solver, &plant.layout, coordinate, model_at)
             .map_err(|lost| (mode, lost))?;

@@ -288,8 +288,7 @@ mod tests {
             label: None,
             value: Complex::new(re, im),
             identity_confidence: None,
-            participation_structure: None,
-            participation_nozzle: None,
+            participation: None,
             residual: None,
         }
     }
@@ -297,7 +296,12 @@ mod tests {
     fn record(evaluations: Vec<(usize, usize, Result<Vec<Pole>, Failure>)>) -> Record {
         let evaluations = evaluations
             .into_iter()
-            .map(|(variant, flight_time, outcome)| Evaluation { variant, flight_time, outcome })
+            .map(|(variant, flight_time, outcome)| Evaluation {
+                variant,
+                flight_time,
+                null_poles: 0,
+                outcome,
+            })
             .collect();
         Record { population: 0, case: 0, values: vec![], scores: vec![], evaluations }
     }

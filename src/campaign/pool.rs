@@ -157,6 +157,7 @@ fn guarded(
         let evaluations = (0..definition.flight_times_s.len()).flat_map(|flight_time| {
             let outcome: Result<_, Failure> = Err(failure.clone());
             (0..definition.variants.len()).map(move |variant| Evaluation {
+                null_poles: 0,
                 variant,
                 flight_time,
                 outcome: outcome.clone(),

@@ -2,6 +2,7 @@
 //!
 //! A record is a value; how it is stored is decided in `io`.
 
+use crate::dynamics::Part;
 use nalgebra::Complex;
 
 /// Why an evaluation failed. An unstable pole is a result, not a failure.
@@ -105,10 +106,9 @@ pub struct Pole {
     pub value: Complex<f64>,
     /// Two-sided overlap with the nominal pole of the same name, modulus, −; `None` for other poles.
     pub identity_confidence: Option<f64>,
-    /// Sum of the participation factors of the elastic states, −.
-    pub participation_structure: Option<f64>,
-    /// Sum of the participation factors of the gimbal states, −.
-    pub participation_nozzle: Option<f64>,
+    /// Sums of the participation factors of the states of each part, −, in the order of
+    /// [`Part::ALL`].
+    pub participation: Option<[f64; Part::ALL.len()]>,
     /// Relative residual of the eigenpair, −; `None` where no vector was computed.
     pub residual: Option<f64>,
 }
@@ -137,6 +137,8 @@ pub struct Evaluation {
     pub variant: usize,
     /// Index of the flight time in the run definition.
     pub flight_time: usize,
+    /// Number of poles at the origin known by construction, beside those solved for.
+    pub null_poles: usize,
     /// The poles asked for, named modes first in the order of the run definition, or a failure.
     pub outcome: Result<Vec<Pole>, Failure>,
 }

@@ -34,6 +34,8 @@ pub struct ModeRow {
     pub variant: usize,
     /// Index of the flight time.
     pub flight_time: usize,
+    /// Number of poles at the origin known by construction, beside those solved for.
+    pub null_poles: usize,
     /// Index of the named mode; none for a pole that belongs to no named mode.
     pub mode: Option<usize>,
     /// The pole, or why there is none.
@@ -48,7 +50,16 @@ pub fn rows(definition: &Definition, record: Record) -> (CaseRow, Vec<ModeRow>) 
     let mut modes = Vec::new();
     for evaluation in record.evaluations {
         let (variant, flight_time) = (evaluation.variant, evaluation.flight_time);
-        let row = |mode, outcome| ModeRow { population, case, variant, flight_time, mode, outcome };
+        let null_poles = evaluation.null_poles;
+        let row = |mode, outcome| ModeRow {
+            population,
+            case,
+            variant,
+            flight_time,
+            null_poles,
+            mode,
+            outcome,
+        };
         match evaluation.outcome {
             Ok(poles) => modes.extend(poles.into_iter().map(|pole| row(pole.mode, Ok(pole)))),
             Err(failure) => modes.extend(

@@ -17,6 +17,9 @@ pub fn definition(cases: &[u64]) -> Definition {
         nozzle_jet_damping: if jet { NozzleJet::Linear } else { NozzleJet::Off },
         follower_thrust: false,
         slope: Slope::VirtualGrid,
+        rigid_body: false,
+        slosh: false,
+        aerodynamics: false,
     };
     let names = ["nominal", "dispersed", "corner_dispersed"];
     let population = |(index, &cases): (usize, &u64)| Population {
@@ -84,7 +87,7 @@ pub fn evaluate(
                 }
                 _ => Ok(poles(definition, variant, case, stored, &mut random)),
             };
-            evaluations.push(Evaluation { variant, flight_time, outcome });
+            evaluations.push(Evaluation { variant, flight_time, null_poles: 0, outcome });
         }
     }
     Record {
@@ -115,8 +118,7 @@ fn poles(
                 30.0 + random.next(),
             ),
             identity_confidence: mode.map(|_| random.next()),
-            participation_structure: Some(random.next()),
-            participation_nozzle: Some(random.next()),
+            participation: Some(std::array::from_fn(|_| random.next())),
             residual: mode.map(|_| 1e-15 * random.next()),
         });
     };

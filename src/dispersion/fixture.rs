@@ -88,7 +88,15 @@ fn with_modes(sets: Vec<ModeSet>, parents: Vec<Parent>) -> Vehicle {
             engine("booster", "left", Bearing::Included),
             engine("booster", "right", Bearing::Included),
         ],
-        modal: Modal { source: "test".into(), contains_engines: Vec::new(), sets, parents },
+        tanks: Vec::new(),
+        aerodynamics: None,
+        modal: Modal {
+            source: "test".into(),
+            contains_engines: Vec::new(),
+            contains_tanks: Vec::new(),
+            sets,
+            parents,
+        },
     }
 }
 

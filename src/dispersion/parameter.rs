@@ -47,6 +47,8 @@ pub enum Scope {
     Engine,
     /// Actuator of an engine.
     Actuator,
+    /// Tank.
+    Tank,
     /// Engine and modal label: the gimbal's part in a mode.
     Gimbal,
 }
@@ -63,6 +65,8 @@ pub enum Place {
     Engine(usize),
     /// Engine and actuator.
     Actuator(usize, usize),
+    /// A tank.
+    Tank(usize),
     /// Engine and modal label.
     Gimbal(usize, usize),
 }
@@ -128,6 +132,18 @@ registry! {
     ActuatorDamping, Actuator, "<group>.<engine>.actuator.<actuator>.damping", "1", NonNegative, "actuator damping ratio at the reference inertia";
     GimbalShape, Gimbal, "<group>.<engine>.gimbal.<label>.shape", "1", Any, "gain on the gimbal translation of a mode, nominal 1";
     GimbalSlope, Gimbal, "<group>.<engine>.gimbal.<label>.slope", "1", Any, "gain on the gimbal rotation of a mode, nominal 1";
+    SloshMass, Tank, "tank.<tank>.slosh.mass", "kg", NonNegative, "slosh mass of a tank, table in flight time";
+    SloshFrequency, Tank, "tank.<tank>.slosh.frequency", "Hz", Positive, "slosh frequency of a tank under the nominal mean acceleration, table in flight time";
+    SloshDamping, Tank, "tank.<tank>.slosh.damping", "1", NonNegative, "slosh damping ratio of a tank";
+    RollInertia, Vehicle, "body.roll_inertia", "1", Positive, "gain on the inertia of the body about x, nominal 1";
+    PitchInertia, Vehicle, "body.pitch_inertia", "1", Positive, "gain on the inertia of the body about y, nominal 1";
+    YawInertia, Vehicle, "body.yaw_inertia", "1", Positive, "gain on the inertia of the body about z, nominal 1";
+    DynamicPressure, Vehicle, "aerodynamics.dynamic_pressure", "Pa", NonNegative, "dynamic pressure, table in flight time";
+    NormalForceSlope, Vehicle, "aerodynamics.normal_force_slope", "1/rad", Any, "slope of the normal force coefficient, table in flight time";
+    CenterOfPressure, Vehicle, "aerodynamics.center_of_pressure", "m", Any, "station of the centre of pressure, table in flight time";
+    AxialForce, Vehicle, "aerodynamics.axial_force", "1", NonNegative, "axial force coefficient, table in flight time";
+    PitchDamping, Vehicle, "aerodynamics.pitch_damping", "1", Any, "damping coefficient in pitch and yaw, table in flight time";
+    RollDamping, Vehicle, "aerodynamics.roll_damping", "1", Any, "damping coefficient in roll, table in flight time";
 }
 
 impl Quantity {
@@ -137,6 +153,15 @@ impl Quantity {
             (Self::NozzleAblation, Place::Engine(e)) => {
                 vehicle.engines[e].nozzle.ablation.is_some()
             }
+            (
+                Self::DynamicPressure
+                | Self::NormalForceSlope
+                | Self::CenterOfPressure
+                | Self::AxialForce
+                | Self::PitchDamping
+                | Self::RollDamping,
+                _,
+            ) => vehicle.aerodynamics.is_some(),
             _ => true,
         }
     }
@@ -190,6 +215,7 @@ struct Label {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     engines: usize,
+    tanks: usize,
     labels: Vec<Label>,
     /// Number of the first parameter of each quantity.
     first: Vec<usize>,
@@ -219,8 +245,13 @@ impl Parameters {
                 }
             })
             .collect();
-        let mut parameters =
-            Self { engines: vehicle.engines.len(), labels, first: Vec::new(), all: Vec::new() };
+        let mut parameters = Self {
+            engines: vehicle.engines.len(),
+            tanks: vehicle.tanks.len(),
+            labels,
+            first: Vec::new(),
+            all: Vec::new(),
+        };
         for &quantity in Quantity::ALL {
             parameters.first.push(parameters.all.len());
             for place in parameters.places(quantity.definition().scope) {
@@ -241,6 +272,7 @@ impl Parameters {
             Scope::Actuator => {
                 engines.flat_map(|e| (0..ACTUATORS).map(move |a| Place::Actuator(e, a))).collect()
             }
+            Scope::Tank => (0..self.tanks).map(Place::Tank).collect(),
             Scope::Gimbal => engines
                 .flat_map(|e| (0..self.labels.len()).map(move |l| Place::Gimbal(e, l)))
                 .collect(),
@@ -261,6 +293,7 @@ impl Parameters {
                 let name = &vehicle.engines[e].actuators[a].name;
                 engine(path, e).replace("<actuator>", name)
             }
+            Place::Tank(t) => path.replace("<tank>", &vehicle.tanks[t].name),
             Place::Gimbal(e, l) => engine(path, e).replace("<label>", &self.labels[l].name),
         }
     }
@@ -272,6 +305,7 @@ impl Parameters {
             Place::Mode(l) => (Scope::Mode, l),
             Place::Engine(e) => (Scope::Engine, e),
             Place::Actuator(e, a) => (Scope::Actuator, e * ACTUATORS + a),
+            Place::Tank(t) => (Scope::Tank, t),
             Place::Gimbal(e, l) => (Scope::Gimbal, e * self.labels.len() + l),
         };
         debug_assert_eq!(scope, quantity.definition().scope, "{quantity:?} at {place:?}");
@@ -312,7 +346,7 @@ impl Place {
     pub fn label(self) -> Option<usize> {
         match self {
             Self::Mode(l) | Self::Gimbal(_, l) => Some(l),
-            Self::Vehicle | Self::Engine(_) | Self::Actuator(..) => None,
+            Self::Vehicle | Self::Engine(_) | Self::Actuator(..) | Self::Tank(_) => None,
         }
     }
 }
@@ -365,6 +399,7 @@ mod tests {
                 Scope::Mode => &["<label>"],
                 Scope::Engine => &["<group>", "<engine>"],
                 Scope::Actuator => &["<group>", "<engine>", "<actuator>"],
+                Scope::Tank => &["<tank>"],
                 Scope::Gimbal => &["<group>", "<engine>", "<label>"],
             };
             assert_eq!(variable, expected, "{}", definition.path);

@@ -45,13 +45,49 @@ impl DrawnEngine {
     }
 }
 
-/// The body as drawn: frequency and damping per mode.
-#[derive(Debug, Clone, PartialEq, Default)]
+/// The body as drawn: frequency and damping per mode, inertia.
+#[derive(Debug, Clone, PartialEq)]
 pub struct DrawnBody {
     /// Natural frequency Ω per mode, rad/s.
     pub frequency_rad_s: Vec<f64>,
     /// Damping ratio ζ per mode, −.
     pub damping_ratio: Vec<f64>,
+    /// Gain on the inertia of the body about x (roll), y (pitch) and z (yaw), −.
+    pub inertia_gain: [f64; 3],
+}
+
+impl Default for DrawnBody {
+    fn default() -> Self {
+        Self { frequency_rad_s: Vec::new(), damping_ratio: Vec::new(), inertia_gain: [1.0; 3] }
+    }
+}
+
+/// The slosh mass of a tank as drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DrawnTank {
+    /// Slosh mass m_s, kg.
+    pub mass_kg: f64,
+    /// Slosh frequency ω_s, rad/s.
+    pub frequency_rad_s: f64,
+    /// Slosh damping ratio ζ_s, −.
+    pub damping_ratio: f64,
+}
+
+/// The aerodynamics as drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct DrawnAerodynamics {
+    /// Dynamic pressure q, Pa.
+    pub dynamic_pressure_pa: f64,
+    /// Slope of the normal force coefficient C_Nα, 1/rad.
+    pub normal_force_slope_1_rad: f64,
+    /// Station of the centre of pressure, structural frame, m.
+    pub center_of_pressure_x_m: f64,
+    /// Axial force coefficient C_A, −.
+    pub axial_force: f64,
+    /// Damping coefficient in pitch and yaw C_mq, −, negative where it damps.
+    pub pitch_damping: f64,
+    /// Damping coefficient in roll C_lp, −, negative where it damps.
+    pub roll_damping: f64,
 }
 
 /// A drawn vehicle at one flight time.
@@ -61,4 +97,8 @@ pub struct DrawnVehicle {
     pub body: DrawnBody,
     /// Every engine of the vehicle, in its order.
     pub engines: Vec<DrawnEngine>,
+    /// Every tank of the vehicle, in its order.
+    pub tanks: Vec<DrawnTank>,
+    /// Aerodynamics at this flight time, if the vehicle has them.
+    pub aerodynamics: Option<DrawnAerodynamics>,
 }

@@ -1,7 +1,9 @@
 //! Dynamics: from one drawn vehicle to one linear model.
 //!
-//! Coordinates are the elastic coordinates η of the reduced body (engines removed, mass-normalised)
-//! and two gimbal rotations Θ per gimballed engine, relative to the thrust structure. Rotations are
+//! Coordinates are the rigid translation ξ and rotation θ of the trajectory-relative frame (optional),
+//! the elastic coordinates η of the reduced body (engines and slosh masses removed, mass-normalised),
+//! two gimbal rotations Θ per gimballed engine, relative to the thrust structure, and two slosh
+//! displacements δ per tank (optional); then the first-order states of actuators and autopilot. Rotations are
 //! small rotation vectors: a point carried by a body that rotates by ρ about p moves by ρ × (x − p).
 //! `u` is the unit vector of the thrust force on the vehicle (nominally −x); generalised forces stand
 //! on the right-hand side, so that they enter stiffness and damping with a minus.
@@ -15,16 +17,23 @@
 //!   the exact critical thrust beside it;
 //! - (13): the part of the exact nozzle term that is linear in the nozzle length; both are offered.
 
+pub mod aerodynamics;
 pub mod assemble;
+pub mod attached;
 pub mod drawn;
+pub mod engine;
 pub mod jet_damping;
 pub mod layout;
 pub mod load_response;
 pub mod model;
 pub mod planar;
+pub mod rigid_body;
+pub mod slosh;
 pub mod virtual_grid;
 
-pub use assemble::{Attachment, Effects, NozzleJet, Plant};
-pub use drawn::{DrawnBody, DrawnEngine, DrawnVehicle};
-pub use layout::Layout;
-pub use model::Model;
+pub use assemble::{Effects, NozzleJet, Plant};
+pub use drawn::{DrawnAerodynamics, DrawnBody, DrawnEngine, DrawnTank, DrawnVehicle};
+pub use engine::Attachment;
+pub use layout::{Layout, Part};
+pub use model::{Model, NullMotion};
+pub use slosh::TankAttachment;

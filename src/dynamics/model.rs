@@ -1,37 +1,77 @@
-//! A linear model `M q̈ + D q̇ + K q = 0` in the coordinates of a layout.
+//! A linear model of mixed order, `M ẍ + D ẋ + K x = 0` in the coordinates of a layout.
 //!
 //! It holds matrices; what they mean is decided in `assemble`, what follows from them in `modal`.
 
 use faer::Mat;
 
-/// The matrices of one linear model, n×n each, in SI units.
+/// The matrices of one linear model in SI units, N×N each.
+///
+/// The first n coordinates are of second order; the last ones are first-order states x_a: their rows
+/// and columns of M are zero and their block of D is the unit matrix, so that
+/// `ẋ_a = −K_aa x_a − K_aq q − D_aq q̇` and `−K_qa x_a` is the force they exert.
 #[derive(Debug, Clone)]
 pub struct Model {
-    /// Mass matrix M, symmetric positive definite.
+    /// Mass matrix M, symmetric positive definite in its second-order block.
     pub mass: Mat<f64>,
     /// Damping matrix D.
     pub damping: Mat<f64>,
     /// Stiffness matrix K.
     pub stiffness: Mat<f64>,
+    /// Number n of second-order coordinates.
+    pub second_order: usize,
+    /// States (numbered in [q, q̇, x_a], ascending) that no equation of another kept state reads:
+    /// each is a pole at the origin, known without solving. The state matrix leaves them out.
+    pub null_states: Vec<usize>,
+    /// A motion at no cost that is no single state: its null state and the components of the other
+    /// states per unit of that one. The state matrix is that of the states less this motion.
+    pub null_motion: Option<NullMotion>,
+}
+
+/// See [`Model::null_motion`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NullMotion {
+    /// The null state left out, one of [`Model::null_states`].
+    pub state: usize,
+    /// Two other states and their components per unit of the one left out.
+    pub others: [(usize, f64); 2],
 }
 
 impl Model {
-    /// A model of zeros with `coordinates` coordinates.
+    /// A model of zeros with `coordinates` coordinates, all of second order.
     pub fn zeros(coordinates: usize) -> Self {
         let zero = || Mat::zeros(coordinates, coordinates);
-        Self { mass: zero(), damping: zero(), stiffness: zero() }
+        Self {
+            mass: zero(),
+            damping: zero(),
+            stiffness: zero(),
+            second_order: coordinates,
+            null_states: Vec::new(),
+            null_motion: None,
+        }
     }
 
-    /// Number of generalised coordinates.
+    /// Number of coordinates.
     pub fn coordinates(&self) -> usize {
         self.mass.nrows()
     }
 
-    /// Sets every entry to zero.
-    pub fn clear(&mut self) {
+    /// Number of states that are solved for: 2n + p less the null states.
+    pub fn states(&self) -> usize {
+        self.second_order + self.coordinates() - self.null_states.len()
+    }
+
+    /// Sets every entry to zero, with `second_order` coordinates of second order and the unit block
+    /// of the others.
+    pub fn clear(&mut self, second_order: usize) {
         self.mass.fill(0.0);
         self.damping.fill(0.0);
         self.stiffness.fill(0.0);
+        self.second_order = second_order;
+        self.null_states.clear();
+        self.null_motion = None;
+        for state in second_order..self.coordinates() {
+            self.damping[(state, state)] = 1.0;
+        }
     }
 
     /// Whether every entry is finite.
@@ -41,7 +81,7 @@ impl Model {
         })
     }
 
-    /// Sets this model to `(1 − t) a + t b`.
+    /// Sets this model to `(1 − t) a + t b`, two models of one layout. Null states are those of both.
     pub fn blend(&mut self, a: &Self, b: &Self, t: f64) {
         let pairs = [
             (&mut self.mass, &a.mass, &b.mass),
@@ -55,5 +95,14 @@ impl Model {
                 }
             }
         }
+        self.second_order = a.second_order;
+        self.null_states.clear();
+        let motions = [a, b].map(|model| model.null_motion);
+        self.null_motion = if motions[0] == motions[1] { motions[0] } else { None };
+        let motion = |state: &usize| {
+            self.null_motion.is_none() && motions.iter().flatten().any(|m| m.state == *state)
+        };
+        let both = a.null_states.iter().filter(|s| b.null_states.contains(s) && !motion(s));
+        self.null_states.extend(both);
     }
 }

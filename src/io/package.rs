@@ -119,7 +119,7 @@ pub struct Header {
     pub normalisation: String,
     /// Engines (`group.name`) whose mass the modes contain; empty for a reduced body.
     pub contains_engines: Vec<String>,
-    /// Tanks whose slosh masses the modes contain; must be empty.
+    /// Tanks whose slosh masses the modes contain, locked; empty for a reduced body.
     pub contains_tanks: Vec<String>,
     /// Overlaps by which labels were given, where they were given by overlap.
     pub labels: Option<LabelHeader>,
@@ -165,7 +165,7 @@ pub fn write(
         frame: FRAME.to_owned(),
         normalisation: "mass".to_owned(),
         contains_engines: modal.contains_engines.clone(),
-        contains_tanks: Vec::new(),
+        contains_tanks: modal.contains_tanks.clone(),
         labels: Some(LabelHeader {
             keep_overlap: thresholds.keep,
             parent_overlap: thresholds.parent,
@@ -257,6 +257,7 @@ pub fn read(dir: &Path) -> Result<Modal, Problems> {
     let modal = Modal {
         source: header.source,
         contains_engines: header.contains_engines,
+        contains_tanks: header.contains_tanks,
         parents: check.parents(&sets, &parents),
         sets,
     };
@@ -287,16 +288,16 @@ pub fn header(text: &str, file: &str) -> Result<Header, Problems> {
     only("units", &header.units, "SI");
     only("frame", &header.frame, FRAME);
     only("normalisation", &header.normalisation, "mass");
-    let mut engines = BTreeSet::new();
-    for engine in &header.contains_engines {
-        if engine.is_empty() || !engines.insert(engine) {
-            let found = format!("`{engine}`");
-            problems.push(Kind::Input, file, "contains_engines", found, "each engine once");
+    for (key, names, allowed) in [
+        ("contains_engines", &header.contains_engines, "each engine once"),
+        ("contains_tanks", &header.contains_tanks, "each tank once"),
+    ] {
+        let mut known = BTreeSet::new();
+        for name in names {
+            if name.is_empty() || !known.insert(name) {
+                problems.push(Kind::Input, file, key, format!("`{name}`"), allowed);
+            }
         }
-    }
-    if !header.contains_tanks.is_empty() {
-        let found = format!("{:?}", header.contains_tanks);
-        problems.push(Kind::Input, file, "contains_tanks", found, "no tank");
     }
     for key in header.blake3.keys() {
         if LAYOUTS.iter().all(|layout| layout.name != key) {

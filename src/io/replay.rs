@@ -96,15 +96,16 @@ impl Replay {
         let variant = definition.variants[view.evaluation.variant].name.as_str();
         let time = definition.flight_times_s[view.evaluation.flight_time];
         let layout = &view.plant.layout;
-        let names = layout.state_names();
+        let names = layout.state_names(&view.model.null_states);
+        let coordinates: Vec<String> = (0..layout.coordinates()).map(|c| layout.name(c)).collect();
         let size = layout.coordinates();
         let mut solver = Solver::new(size);
         let model = view.model;
         let failure = |error: eigen::Error| Failure::from(&error);
         let state = solver.state_matrix(model).map_err(failure)?.clone();
-        let mut matrix = |name: &str, size: usize, entry: &dyn Fn(usize, usize) -> f64| {
-            for row in 0..size {
-                for column in 0..size {
+        let mut matrix = |name: &str, names: &[String], entry: &dyn Fn(usize, usize) -> f64| {
+            for row in 0..names.len() {
+                for column in 0..names.len() {
                     let value = entry(row, column);
                     if value != 0.0 {
                         let texts = [variant, name, &names[row], &names[column]];
@@ -114,17 +115,17 @@ impl Replay {
                 }
             }
         };
-        matrix("M", size, &|i, j| model.mass[(i, j)]);
-        matrix("D", size, &|i, j| model.damping[(i, j)]);
-        matrix("K", size, &|i, j| model.stiffness[(i, j)]);
-        matrix("A", 2 * size, &|i, j| state[(i, j)]);
+        matrix("M", &coordinates, &|i, j| model.mass[(i, j)]);
+        matrix("D", &coordinates, &|i, j| model.damping[(i, j)]);
+        matrix("K", &coordinates, &|i, j| model.stiffness[(i, j)]);
+        matrix("A", &names, &|i, j| state[(i, j)]);
         let mut poles = Vec::new();
         solver.poles(model, &mut poles).map_err(failure)?;
         for (number, &pole) in poles.iter().enumerate() {
             let reference = Reference::new(model, solver.pair(model, pole));
             let number = number as f64;
             self.poles.push(&[variant], &[time, number, pole.re, pole.im, reference.pair.residual]);
-            let (right, left) = reference.state_vectors();
+            let (right, left) = reference.state_vectors(model);
             for ((name, v), w) in names.iter().zip(right).zip(left) {
                 self.vectors.push(&[variant, name], &[time, number, v.re, v.im, w.re, w.im]);
             }

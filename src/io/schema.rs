@@ -9,6 +9,7 @@ use crate::campaign::outline::{Outline, StoredPoles};
 use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
 use crate::campaign::row::{CaseRow, ModeRow};
 use crate::campaign::summary::{LEVELS, Spread, SummaryRow, WorstRow};
+use crate::dynamics::Part;
 use arrow::datatypes::Field;
 use std::sync::Arc;
 
@@ -187,6 +188,17 @@ fn draws(outline: &Outline) -> Vec<Column<CaseRow>> {
     columns
 }
 
+/// The column of the `modes` table with the participation of a part.
+pub fn participation_name(part: Part) -> &'static str {
+    match part {
+        Part::RigidBody => "participation_rigid_body",
+        Part::Structure => "participation_structure",
+        Part::Nozzle => "participation_nozzle",
+        Part::Slosh => "participation_slosh",
+        Part::Servo => "participation_servo",
+    }
+}
+
 /// Columns of the `modes` table.
 pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
     let times = outline.definition.flight_times_s.clone();
@@ -195,7 +207,7 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
             r.outcome.as_ref().ok().and_then(get)
         })
     };
-    vec![
+    let mut columns = vec![
         population(outline, |r: &ModeRow| r.population),
         Column::count("case", "Case index inside the population", |r: &ModeRow| {
             Some(r.case as i64)
@@ -215,10 +227,15 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
                 BRANCHES.iter().position(|other| *other == branch)
             },
         ),
+        Column::count(
+            "null_poles",
+            "Poles at the origin of this model, known by construction and not solved for",
+            |r: &ModeRow| Some(r.null_poles as i64),
+        ),
         Column::text(
             "label",
-            "Modal label the pole carries; for other poles that of the elastic mode with more than \
-             half of the participation, if any",
+            "Modal label the pole carries; for other poles the mode, rigid motion (axial, roll, pitch, \
+             yaw), nozzle, tank or servo with more than half of the participation, if any",
             |r: &ModeRow| r.outcome.as_ref().ok()?.label.as_deref(),
         ),
         number("pole_re_rad_s", "rad/s", "Real part of the pole; NULL if failed", |p| {
@@ -246,18 +263,16 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
              1; where two poles exchange character the path decides, not this number",
             |p| p.identity_confidence,
         ),
-        number(
-            "participation_structure",
+    ];
+    for (index, part) in Part::ALL.into_iter().enumerate() {
+        columns.push(Column::number(
+            participation_name(part),
             "1",
-            "Real part of the sum of the participation factors of the elastic states; may leave 0 to 1",
-            |p| p.participation_structure,
-        ),
-        number(
-            "participation_nozzle",
-            "1",
-            "Real part of the sum of the participation factors of the gimbal states; may leave 0 to 1",
-            |p| p.participation_nozzle,
-        ),
+            "Real part of the sum of the participation factors of the states of this part; may leave 0 to 1",
+            move |r: &ModeRow| Some(r.outcome.as_ref().ok()?.participation?[index]),
+        ));
+    }
+    columns.extend([
         number("residual", "1", "Relative residual of the eigenpair", |p| p.residual),
         Column::word("status", "ok, or the kind of failure", statuses(), |r: &ModeRow| {
             Some(status(r.outcome.as_ref().err()))
@@ -265,7 +280,8 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
         Column::text("failure_message", "What the failure says", |r: &ModeRow| {
             r.outcome.as_ref().err().map(|f| f.message.as_str())
         }),
-    ]
+    ]);
+    columns
 }
 
 /// Columns of the `summary` table.

@@ -6,6 +6,7 @@ use super::run::Run;
 use super::schema::{self, TableName};
 use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
 use crate::campaign::row::ModeRow;
+use crate::dynamics::Part;
 use crate::problem::Problems;
 use arrow::array::{Array, AsArray};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
@@ -55,6 +56,7 @@ impl Run {
         let status = words("status", &schema::statuses().collect::<Vec<_>>())?;
         let case = column("case").as_primitive::<Int64Type>();
         let time = column("flight_time_s").as_primitive::<Float64Type>();
+        let null_poles = column("null_poles").as_primitive::<Int64Type>();
         let (label, message) = (column("label"), column("failure_message"));
         let text = |array: &dyn Array, row: usize| {
             let array = array.as_string::<i32>();
@@ -63,6 +65,13 @@ impl Run {
         let number = |name: &str, row: usize| {
             let array = column(name).as_primitive::<Float64Type>();
             array.is_valid(row).then(|| array.value(row))
+        };
+        let participation = |row: usize| {
+            let mut shares = [0.0; Part::ALL.len()];
+            for (share, part) in shares.iter_mut().zip(Part::ALL) {
+                *share = number(schema::participation_name(part), row)?;
+            }
+            Some(shares)
         };
         let mut rows = Vec::with_capacity(batch.num_rows());
         for row in 0..batch.num_rows() {
@@ -89,8 +98,7 @@ impl Run {
                         label: text(label, row),
                         value: Complex::new(re, im),
                         identity_confidence: number("identity_confidence", row),
-                        participation_structure: number("participation_structure", row),
-                        participation_nozzle: number("participation_nozzle", row),
+                        participation: participation(row),
                         residual: number("residual", row),
                     })
                 }
@@ -101,8 +109,16 @@ impl Run {
                 None => return Err(damage("a row without a status", "ok or a failure")),
             };
             let case = case.value(row) as u64;
-            let mode = mode[row];
-            rows.push(ModeRow { population, case, variant, flight_time, mode, outcome });
+            let (mode, null_poles) = (mode[row], null_poles.value(row) as usize);
+            rows.push(ModeRow {
+                population,
+                case,
+                variant,
+                flight_time,
+                null_poles,
+                mode,
+                outcome,
+            });
         }
         Ok(rows)
     }

@@ -56,7 +56,8 @@ pub struct Pair {
     pub right: Vec<c64>,
     /// Left vector y, unit norm.
     pub left: Vec<c64>,
-    /// Root of the sum of squares of ‖L x‖ and ‖yᴴ L‖ over ‖M‖|s|² + ‖D‖|s| + ‖K‖ (Frobenius norms), −.
+    /// Root of the sum of squares of ‖L x‖ and ‖yᴴ L‖ over ‖M‖|s|² + ‖D‖|s| + ‖K‖ (Frobenius norms), −,
+    /// in coordinates scaled so that the diagonal is near one.
     pub residual: f64,
 }
 
@@ -66,9 +67,13 @@ pub struct Solver {
     factor: Mat<f64>,
     right_side: Mat<f64>,
     state: DMatrix<f64>,
+    /// State [q, q̇, x_a] of each row of the state matrix.
+    kept: Vec<usize>,
     real: Vec<f64>,
     imaginary: Vec<f64>,
     pencil: Mat<c64>,
+    /// Power of two by which each coordinate is scaled in the pencil.
+    scale: Vec<f64>,
     permutation: Vec<usize>,
     inverse_permutation: Vec<usize>,
     vectors: Mat<c64>,
@@ -80,7 +85,7 @@ pub struct Solver {
 const TRACE_FACTOR: f64 = 1e4;
 
 impl Solver {
-    /// A solver for models with `coordinates` generalised coordinates.
+    /// A solver for models with `coordinates` coordinates, of second or first order.
     pub fn new(coordinates: usize) -> Self {
         let states = 2 * coordinates;
         let requirements = [
@@ -111,9 +116,11 @@ impl Solver {
             factor: Mat::zeros(coordinates, coordinates),
             right_side: Mat::zeros(coordinates, states),
             state: DMatrix::zeros(states, states),
+            kept: Vec::with_capacity(states),
             real: vec![0.0; states],
             imaginary: vec![0.0; states],
             pencil: Mat::zeros(coordinates, coordinates),
+            scale: vec![1.0; coordinates],
             permutation: vec![0; coordinates],
             inverse_permutation: vec![0; coordinates],
             vectors: Mat::zeros(coordinates, 2),
@@ -122,7 +129,8 @@ impl Solver {
     }
 
     /// All poles of the model, rad/s, appended to `poles` (cleared first) with each complex pair
-    /// represented by its member in the upper half plane; sorted by imaginary, then real part.
+    /// represented by its member in the upper half plane; sorted by imaginary, then real part. The
+    /// null states of the model are no part of them: each is one more pole, at the origin.
     ///
     /// # Errors
     /// See [`Error`]; poles are checked against the traces of the state matrix and its square.
@@ -136,11 +144,12 @@ impl Solver {
             return Err(Error::NonFinite("the square of the state matrix"));
         }
         nalgebra::linalg::balancing::balance_parlett_reinsch(&mut self.state);
-        let states = 2 * self.coordinates;
+        let states = self.kept.len();
+        let (real, imaginary) = (&mut self.real[..states], &mut self.imaginary[..states]);
         evd::evd_real(
             MatRef::from_column_major_slice(self.state.as_slice(), states, states),
-            faer::ColMut::from_slice_mut(&mut self.real).as_diagonal_mut(),
-            faer::ColMut::from_slice_mut(&mut self.imaginary).as_diagonal_mut(),
+            faer::ColMut::from_slice_mut(real).as_diagonal_mut(),
+            faer::ColMut::from_slice_mut(imaginary).as_diagonal_mut(),
             None,
             None,
             Par::Seq,
@@ -148,7 +157,8 @@ impl Solver {
             Spec::<EvdParams, f64>::default(),
         )
         .map_err(|_| Error::NoConvergence)?;
-        let all = || self.real.iter().zip(&self.imaginary).map(|(re, im)| c64::new(*re, *im));
+        let (real, imaginary) = (&self.real[..states], &self.imaginary[..states]);
+        let all = || real.iter().zip(imaginary).map(|(re, im)| c64::new(*re, *im));
         if !all().all(|s| s.re.is_finite() && s.im.is_finite()) {
             return Err(Error::NonFinite("a pole"));
         }
@@ -176,7 +186,8 @@ impl Solver {
         Ok(())
     }
 
-    /// The state matrix A of `ẋ = A x`, x = [q, q̇], 2n×2n column-major, in SI units.
+    /// The state matrix A of `ẋ = A x`, x = [q, q̇, x_a] without the null states, square,
+    /// column-major, in SI units.
     ///
     /// # Errors
     /// See [`Error`].
@@ -185,16 +196,18 @@ impl Solver {
         Ok(&self.state)
     }
 
-    /// `A = [[0, 1], [−M⁻¹K, −M⁻¹D]]`.
+    /// `A = [[0, 1, 0], [−M⁻¹K, −M⁻¹D, −M⁻¹K_qa], [−K_aq, −D_aq, −K_aa]]` without the rows and columns of
+    /// the null states, which nothing else reads.
     fn build_state(&mut self, model: &Model) -> Result<(), Error> {
-        let n = self.coordinates;
-        assert_eq!(model.coordinates(), n, "the solver was made for another size");
+        let (size, n) = (self.coordinates, model.second_order);
+        assert_eq!(model.coordinates(), size, "the solver was made for another size");
         if !model.is_finite() {
             return Err(Error::NonFinite("the model"));
         }
-        self.factor.copy_from(&model.mass);
+        let mut factor = self.factor.as_mut().submatrix_mut(0, 0, n, n);
+        factor.copy_from(model.mass.as_ref().submatrix(0, 0, n, n));
         llt::factor::cholesky_in_place(
-            self.factor.as_mut(),
+            factor.as_mut(),
             llt::factor::LltRegularization::default(),
             Par::Seq,
             MemStack::new(&mut self.memory),
@@ -204,21 +217,48 @@ impl Solver {
             let llt::factor::LltError::NonPositivePivot { index } = error;
             Error::SingularMass { pivot: index }
         })?;
-        self.right_side.as_mut().subcols_mut(0, n).copy_from(&model.stiffness);
-        self.right_side.as_mut().subcols_mut(n, n).copy_from(&model.damping);
+        // Columns [K_qq, D_qq, K_qa], in the order of the states.
+        let mut right_side = self.right_side.as_mut().submatrix_mut(0, 0, n, n + size);
+        let rows = |matrix: &'_ Mat<f64>, from: usize, count: usize, mut to: MatMut<'_, f64>| {
+            to.copy_from(matrix.as_ref().submatrix(0, from, n, count));
+        };
+        rows(&model.stiffness, 0, n, right_side.as_mut().subcols_mut(0, n));
+        rows(&model.damping, 0, n, right_side.as_mut().subcols_mut(n, n));
+        rows(&model.stiffness, n, size - n, right_side.as_mut().subcols_mut(2 * n, size - n));
         llt::solve::solve_in_place(
-            self.factor.as_ref(),
-            self.right_side.as_mut(),
+            factor.as_ref(),
+            right_side.as_mut(),
             Par::Seq,
             MemStack::new(&mut self.memory),
         );
-        self.state.fill(0.0);
-        for column in 0..2 * n {
-            if column >= n {
-                self.state[(column - n, column)] = 1.0;
+        self.kept.clear();
+        self.kept.extend((0..n + size).filter(|state| !model.null_states.contains(state)));
+        let states = self.kept.len();
+        if self.state.nrows() != states {
+            self.state = DMatrix::zeros(states, states);
+        }
+        for (column, &from) in self.kept.iter().enumerate() {
+            for (row, &to) in self.kept.iter().enumerate() {
+                self.state[(row, column)] = if to < n {
+                    f64::from(u8::from(from == n + to))
+                } else if to < 2 * n {
+                    -right_side[(to - n, from)]
+                } else if from < n {
+                    -model.stiffness[(to - n, from)]
+                } else if from < 2 * n {
+                    -model.damping[(to - n, from - n)]
+                } else {
+                    -model.stiffness[(to - n, from - n)]
+                };
             }
-            for row in 0..n {
-                self.state[(n + row, column)] = -self.right_side[(row, column)];
+        }
+        // Less the null motion v: of z = z̃ + v z_j/v_j only z̃ acts, and z̃_i = z_i − v_i z_j/v_j changes.
+        let motion = model.null_motion.iter();
+        for (other, ratio) in motion.flat_map(|motion| motion.others) {
+            let left_out = model.null_motion.map_or(0, |motion| motion.state);
+            let Some(row) = self.kept.iter().position(|state| *state == other) else { continue };
+            for (column, &from) in self.kept.iter().enumerate() {
+                self.state[(row, column)] += ratio * right_side[(left_out - n, from)];
             }
         }
         Ok(())
@@ -229,7 +269,7 @@ impl Solver {
     /// For a repeated pole any vector of the eigenspace may come back.
     pub fn pair(&mut self, model: &Model, pole: c64) -> Pair {
         let n = self.coordinates;
-        fill_pencil(model, pole, self.pencil.as_mut());
+        self.fill_pencil(model, pole);
         let (info, permutation) = lu::factor::lu_in_place(
             self.pencil.as_mut(),
             &mut self.permutation,
@@ -278,43 +318,65 @@ impl Solver {
                 }
             }
         }
-        let right: Vec<c64> = (0..n).map(|row| self.vectors[(row, 0)]).collect();
-        let left: Vec<c64> = (0..n).map(|row| self.vectors[(row, 1)]).collect();
-        let residual = residual(model, pole, &right, &left);
-        Pair { pole, right, left, residual }
+        let residual = self.residual(model, pole);
+        let unscaled = |column: usize| {
+            let vector: Vec<c64> =
+                (0..n).map(|row| self.vectors[(row, column)] * self.scale[row]).collect();
+            let norm = norm(&vector);
+            vector.into_iter().map(|z| z / norm).collect()
+        };
+        Pair { pole, right: unscaled(0), left: unscaled(1), residual }
+    }
+
+    /// Fills the pencil with `S L(s) S`, where the powers of two S bring the diagonal of
+    /// `|M||s|² + |D||s| + |K|` near one: coordinates of metres, radians and states are told apart by
+    /// their equations, not by their units.
+    fn fill_pencil(&mut self, model: &Model, s: c64) {
+        let (square, modulus) = (s * s, s.norm());
+        for (i, scale) in self.scale.iter_mut().enumerate() {
+            let at = (i, i);
+            let size = model.mass[at].abs() * modulus * modulus
+                + model.damping[at].abs() * modulus
+                + model.stiffness[at].abs();
+            let power = (-0.5 * size.log2()).round();
+            *scale = if power.is_finite() { power.exp2() } else { 1.0 };
+        }
+        for column in 0..model.coordinates() {
+            for row in 0..model.coordinates() {
+                let at = (row, column);
+                let entry = square * model.mass[at] + s * model.damping[at] + model.stiffness[at];
+                self.pencil[at] = entry * (self.scale[row] * self.scale[column]);
+            }
+        }
+    }
+
+    /// Relative residual of the vectors found, see [`Pair::residual`].
+    fn residual(&self, model: &Model, s: c64) -> f64 {
+        let n = model.coordinates();
+        let mut rows = vec![c64::new(0.0, 0.0); n];
+        let mut columns = vec![c64::new(0.0, 0.0); n];
+        let (square, modulus) = (s * s, s.norm());
+        let mut sums = [0.0_f64; 3];
+        for column in 0..n {
+            for row in 0..n {
+                let (at, scale) = ((row, column), self.scale[row] * self.scale[column]);
+                let [m, d, k] = [model.mass[at], model.damping[at], model.stiffness[at]];
+                let entry = (square * m + s * d + k) * scale;
+                rows[row] += entry * self.vectors[(column, 0)];
+                columns[column] += self.vectors[(row, 1)].conj() * entry;
+                for (sum, value) in sums.iter_mut().zip([m, d, k]) {
+                    *sum += (value * scale).powi(2);
+                }
+            }
+        }
+        let [m, d, k] = sums.map(f64::sqrt);
+        norm(&rows).hypot(norm(&columns)) / (m * modulus * modulus + d * modulus + k)
     }
 }
 
-/// Fills `L(s) = M s² + D s + K`.
-fn fill_pencil(model: &Model, s: c64, mut pencil: MatMut<'_, c64>) {
-    let square = s * s;
-    for column in 0..model.coordinates() {
-        for row in 0..model.coordinates() {
-            let at = (row, column);
-            pencil[at] = square * model.mass[at] + s * model.damping[at] + model.stiffness[at];
-        }
-    }
-}
-
-/// Relative residual of a pair, see [`Pair::residual`].
-fn residual(model: &Model, s: c64, right: &[c64], left: &[c64]) -> f64 {
-    let n = model.coordinates();
-    let mut rows = vec![c64::new(0.0, 0.0); n];
-    let mut columns = vec![c64::new(0.0, 0.0); n];
-    let square = s * s;
-    for column in 0..n {
-        for row in 0..n {
-            let at = (row, column);
-            let entry = square * model.mass[at] + s * model.damping[at] + model.stiffness[at];
-            rows[row] += entry * right[column];
-            columns[column] += left[row].conj() * entry;
-        }
-    }
-    let norm = |v: &[c64]| v.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
-    let scale = model.mass.norm_l2() * square.norm()
-        + model.damping.norm_l2() * s.norm()
-        + model.stiffness.norm_l2();
-    norm(&rows).hypot(norm(&columns)) / scale
+/// Euclidean norm.
+fn norm(v: &[c64]) -> f64 {
+    v.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt()
 }
 
 /// Trace of the matrix and of its square.

@@ -84,17 +84,32 @@ impl Reference {
         Self { pair, left_mass, left_damping, derivative }
     }
 
-    /// Right and left eigenvectors of the state matrix A at the pole: v = [x, s x] with unit x, and
-    /// w with `wᴴ A = s wᴴ`, `wᴴ v = 1` (unscaled where the pole is defective).
-    pub fn state_vectors(&self) -> (Vec<c64>, Vec<c64>) {
-        let (s, right) = (self.pair.pole, &self.pair.right);
-        let states = right.iter().copied().chain(right.iter().map(|x| s * x)).collect();
+    /// Right and left eigenvectors of the state matrix A of `model` at the pole, its null states left
+    /// out: v = [q, s q, x_a] with unit x, and w with `wᴴ A = s wᴴ`, `wᴴ v = 1` (unscaled where the
+    /// pole is defective).
+    pub fn state_vectors(&self, model: &Model) -> (Vec<c64>, Vec<c64>) {
+        let (s, n) = (self.pair.pole, model.second_order);
         let scale = self.derivative.inv();
         let scale = if scale.is_finite() { scale } else { c64::new(1.0, 0.0) };
-        // wᴴ = [s yᴴM + yᴴD, yᴴM].
-        let upper = self.left_mass.iter().zip(&self.left_damping).map(|(m, d)| s * m + d);
-        let rows = upper.chain(self.left_mass.iter().copied());
-        (states, rows.map(|w| (w * scale).conj()).collect())
+        let states =
+            (0..n + model.coordinates()).filter(|state| !model.null_states.contains(state));
+        states
+            .map(|state| {
+                // wᴴ = [s yᴴM + yᴴD, yᴴM, y_aᴴ] over [q, q̇, x_a].
+                let (at, rate) =
+                    if state < n { (state, false) } else { (state - n, state < 2 * n) };
+                let right = self.pair.right[at];
+                let (mass, damping) = (self.left_mass[at], self.left_damping[at]);
+                let (mut right, left) =
+                    if rate { (s * right, mass) } else { (right, s * mass + damping) };
+                if let Some(motion) = &model.null_motion {
+                    let ratio = motion.others.iter().find(|(other, _)| *other == state);
+                    let left_out = s * self.pair.right[motion.state - n];
+                    right -= ratio.map_or(0.0, |(_, ratio)| *ratio) * left_out;
+                }
+                (right, (left * scale).conj())
+            })
+            .unzip()
     }
 
     /// `w₀ᴴ v` for a state-space vector v = [x, s x]: `y₀ᴴ [(s₀ + s) M₀ + D₀] x`.
@@ -105,10 +120,11 @@ impl Reference {
             .sum()
     }
 
-    /// Participation factors (state-space, w_i* v_i / wᴴv, real part) summed over the coordinates
-    /// `range` and their rates, −; all coordinates together give one.
-    pub fn participation(&self, range: std::ops::Range<usize>) -> f64 {
-        range
+    /// Participation factors (state-space, w_i* v_i / wᴴv, real part) summed over the
+    /// `coordinates` and their rates, −; all coordinates together give one.
+    pub fn participation(&self, coordinates: impl IntoIterator<Item = usize>) -> f64 {
+        coordinates
+            .into_iter()
             .map(|i| {
                 let weight = 2.0 * self.pair.pole * self.left_mass[i] + self.left_damping[i];
                 (weight * self.pair.right[i] / self.derivative).re
@@ -250,10 +266,10 @@ pub fn identify(
     Ok(Identity { primary, partner: Some(best) })
 }
 
-/// The nominal pole of the elastic coordinate `label`: continuation of a factor 0→1 on engine mass
-/// coupling without thrust and flow, then of a factor 0→1 on thrust and flow.
+/// The nominal pole of the elastic coordinate `label`: continuation of a factor 0→1 on the mass
+/// coupling of everything attached, without thrust, flow, air and feedback, then of a factor 0→1 on these.
 ///
-/// `model_at(f, model)` fills the nominal model with the factor f on thrust and flow.
+/// `model_at(f, model)` fills the nominal model with the factor f on thrust, flow, air and feedback.
 ///
 /// # Errors
 /// [`Lost`] where a solve fails or the mode cannot be followed.
@@ -267,10 +283,10 @@ pub fn nominal(
     let mut coupled = Model::zeros(size);
     model_at(0.0, &mut coupled);
     let mut uncoupled = coupled.clone();
+    let modes = layout.elastic();
     for column in 0..size {
         for row in 0..size {
-            let engine = layout.gimbals().contains(&row) && layout.gimbals().contains(&column);
-            if !engine {
+            if modes.contains(&row) || modes.contains(&column) {
                 let unit = if row == column { 1.0 } else { 0.0 };
                 uncoupled.mass[(row, column)] = unit;
             }
@@ -393,7 +409,7 @@ mod tests {
         // Four coordinates: a second, uncoupled gimbal axis.
         let fill = |factor: f64, out: &mut Model| {
             let three = model([1.0, 1.05], 0.2, 0.2 * factor);
-            out.clear();
+            out.clear(4);
             for (to, from) in [
                 (&mut out.mass, &three.mass),
                 (&mut out.damping, &three.damping),

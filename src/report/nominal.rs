@@ -1,6 +1,7 @@
 //! The poles of one record as a table for the terminal.
 
 use crate::campaign::{Definition, Record};
+use crate::dynamics::Part;
 use comfy_table::{CellAlignment, Table, presets};
 
 /// One row per pole of each evaluation.
@@ -32,7 +33,10 @@ pub fn table(definition: &Definition, record: &Record) -> String {
             }
         };
         for pole in poles {
-            let share = |value: Option<f64>| value.map_or_else(none, |v| format!("{v:.3}"));
+            let share = |part: Part| {
+                let index = Part::ALL.iter().position(|p| *p == part).expect("every part");
+                pole.participation.map_or_else(none, |all| format!("{:.3}", all[index]))
+            };
             table.add_row([
                 time.clone(),
                 variant.clone(),
@@ -44,8 +48,8 @@ pub fn table(definition: &Definition, record: &Record) -> String {
                 format!("{:.4}", pole.frequency_hz()),
                 format!("{:.3}", 100.0 * pole.damping_ratio()),
                 pole.time_to_double_s().map_or_else(none, |t| format!("{t:.2}")),
-                share(pole.participation_structure),
-                share(pole.participation_nozzle),
+                share(Part::Structure),
+                share(Part::Nozzle),
             ]);
         }
     }

@@ -62,5 +62,11 @@ pub fn modal() -> Modal {
             modes: modes.clone(),
         })
         .to_vec();
-    Modal { source: "test".into(), contains_engines: Vec::new(), sets, parents: Vec::new() }
+    Modal {
+        source: "test".into(),
+        contains_engines: Vec::new(),
+        contains_tanks: Vec::new(),
+        sets,
+        parents: Vec::new(),
+    }
 }

@@ -1,5 +1,6 @@
 //! Scenario: from the text of the input files to validated values, with all problems at once.
 
+pub mod aerodynamics;
 pub mod dispersion;
 #[cfg(test)]
 mod fixture;
@@ -10,6 +11,7 @@ pub mod run;
 pub mod run_file;
 pub mod schema;
 pub mod table;
+pub mod tank;
 pub mod vehicle;
 pub mod vehicle_file;
 

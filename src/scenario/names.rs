@@ -40,3 +40,45 @@ pub fn ascending(findings: &mut Findings, key: &str, values: &[f64]) -> bool {
     }
     descent.is_none()
 }
+
+/// Checks the abscissae of a table in flight time: ascending, from before the first flight time to
+/// after the last.
+pub fn table_of_times(
+    findings: &mut Findings,
+    key: &str,
+    time_s: &[f64],
+    flight_times_s: &[f64],
+) -> bool {
+    let mut good = ascending(findings, &format!("{key}.time_s"), time_s);
+    let (Some(first), Some(last)) = (time_s.first(), time_s.last()) else { return false };
+    let outside: Vec<&f64> =
+        flight_times_s.iter().filter(|t| !(first <= *t && *t <= last)).collect();
+    if good && !outside.is_empty() {
+        let found = format!("tables from {first} to {last} s, without {outside:?} s");
+        findings.push(format!("{key}.time_s"), found, "tables that hold every flight time");
+        good = false;
+    }
+    good
+}
+
+/// Checks the entries of a table: `count` of them, each as `holds` says.
+pub fn table_entries(
+    findings: &mut Findings,
+    key: &str,
+    values: &[f64],
+    count: usize,
+    holds: impl Fn(f64) -> bool,
+    allowed: &str,
+) -> bool {
+    let mut good = true;
+    if values.len() != count {
+        let found = format!("{} entries", values.len());
+        findings.push(key, found, format!("{count}, as many as in `time_s`"));
+        good = false;
+    }
+    for (i, value) in values.iter().enumerate().filter(|(_, x)| !holds(**x)) {
+        findings.push(format!("{key}[{i}]"), value.to_string(), allowed);
+        good = false;
+    }
+    good
+}

@@ -138,6 +138,9 @@ fn variant(file: &VariantFile) -> Variant {
             SlopeFile::VirtualGrid => Slope::VirtualGrid,
             SlopeFile::SingleGrid => Slope::SingleGrid,
         },
+        rigid_body: file.rigid_body,
+        slosh: file.slosh,
+        aerodynamics: file.aerodynamics,
     }
 }
 

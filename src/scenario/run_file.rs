@@ -82,6 +82,15 @@ pub struct VariantFile {
     /// Gimbal slope.
     #[serde(default)]
     pub slope: SlopeFile,
+    /// Rigid translation and rotation of the vehicle; off holds them at zero.
+    #[serde(default)]
+    pub rigid_body: bool,
+    /// Slosh masses; off locks them to their tanks.
+    #[serde(default)]
+    pub slosh: bool,
+    /// Aerodynamic forces of the vehicle file.
+    #[serde(default)]
+    pub aerodynamics: bool,
 }
 
 fn yes() -> bool {

@@ -5,7 +5,7 @@
 use super::gimbal::{self, Refusal};
 use super::table::Findings;
 use super::vehicle_file::{ActuatorFile, BearingPart, EngineFile, MotorFile, VehicleFile};
-use super::{names, pattern};
+use super::{aerodynamics, names, pattern, tank};
 use crate::dynamics::virtual_grid::Geometry;
 use crate::problem::Problems;
 use crate::spelling::allowed_instead;
@@ -26,7 +26,8 @@ pub struct Resolved {
 }
 
 /// First segments of the parameter paths that belong to no engine.
-const RESERVED_GROUPS: [&str; 2] = ["structure", "modes"];
+const RESERVED_GROUPS: [&str; 7] =
+    ["structure", "modes", "tank", "body", "aerodynamics", "autopilot", "sensor"];
 
 /// How far an attach point may move from one flight time to the next, m: nothing but rounding.
 const SAME_PLACE_M: f64 = 1e-6;
@@ -43,13 +44,18 @@ pub fn resolve(
 ) -> Result<Resolved, Problems> {
     let mut resolver = Resolver { file, sets: Vec::new(), findings: &mut findings };
     let parts = resolver.resolve(modal.as_ref());
-    let resolved = parts.zip(modal).map(|((engines, named_modes), modal)| Resolved {
+    let tanks = tank::resolve(file, &resolver.sets, modal.as_ref(), resolver.findings);
+    let aerodynamics = aerodynamics::resolve(file, modal.as_ref(), resolver.findings);
+    let parts = parts.zip(tanks).zip(aerodynamics).zip(modal);
+    let resolved = parts.map(|((((engines, named_modes), tanks), aerodynamics), modal)| Resolved {
         vehicle: Vehicle {
             name: file.name.clone(),
             structural_damping: file.structure.damping_ratio,
             band_time_s: file.structure.band_time_s,
             named_modes,
             engines,
+            tanks,
+            aerodynamics,
             modal,
         },
         flight_times_s: file.flight_times_s.clone(),

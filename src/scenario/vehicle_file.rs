@@ -29,6 +29,103 @@ pub struct VehicleFile {
     /// Engines.
     #[schemars(length(min = 1))]
     pub engine: Vec<EngineFile>,
+    /// Tanks whose liquids slosh.
+    #[serde(default)]
+    pub tank: Vec<TankFile>,
+    /// Aerodynamics along the trajectory.
+    pub aerodynamics: Option<AerodynamicsFile>,
+}
+
+/// A tank: its slosh mass on a spring, given directly or from its geometry and fill.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TankFile {
+    /// Name, the second segment of its parameter paths.
+    pub name: String,
+    /// Grid at which the slosh mass is attached.
+    pub grid: String,
+    /// Unit vector of the tank axis (default: along x).
+    #[serde(default = "along_x")]
+    pub axis: [f64; 3],
+    /// Slosh damping ratio.
+    #[schemars(range(min = 0.0))]
+    pub damping_ratio: f64,
+    /// Flight times of the tables, s, ascending.
+    #[schemars(length(min = 1))]
+    pub time_s: Vec<f64>,
+    /// Slosh mass at each time, kg; with `frequency_hz`.
+    pub slosh_mass_kg: Option<Vec<f64>>,
+    /// Slosh frequency at each time, Hz; with `slosh_mass_kg`.
+    pub frequency_hz: Option<Vec<f64>>,
+    /// Upright flat-bottomed cylinder; with `liquid_kg`.
+    pub cylinder: Option<CylinderFile>,
+    /// Mass of the liquid at each time, kg; with `cylinder`.
+    pub liquid_kg: Option<Vec<f64>>,
+}
+
+fn along_x() -> [f64; 3] {
+    [1.0, 0.0, 0.0]
+}
+
+/// An upright flat-bottomed cylinder.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CylinderFile {
+    /// Radius, m.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub radius_m: f64,
+    /// Density of the liquid, kg/m³.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub density_kg_m3: f64,
+}
+
+/// Aerodynamic coefficients at flight conditions, linear between the entries.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AerodynamicsFile {
+    /// Reference area, m².
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub area_m2: f64,
+    /// Reference length, m.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub length_m: f64,
+    /// Flight times of the tables, s, ascending.
+    #[schemars(length(min = 1))]
+    pub time_s: Vec<f64>,
+    /// Dynamic pressure at each time, Pa.
+    pub dynamic_pressure_pa: Vec<f64>,
+    /// Speed at each time, m/s.
+    pub speed_m_s: Vec<f64>,
+    /// Slope of the normal force coefficient at each time, 1/rad.
+    pub normal_force_slope_1_rad: Vec<f64>,
+    /// Station of the centre of pressure at each time, m.
+    pub center_of_pressure_x_m: Vec<f64>,
+    /// Axial force coefficient at each time.
+    pub axial_force: Vec<f64>,
+    /// Damping coefficient in pitch and yaw at each time (moment per q S D and θ̇ D/2V), negative
+    /// where it damps.
+    pub pitch_damping: Vec<f64>,
+    /// Damping coefficient in roll at each time, negative where it damps.
+    pub roll_damping: Vec<f64>,
+    /// Generalised matrices, at most one a flight time.
+    #[serde(default)]
+    pub matrix: Vec<AerodynamicMatrixFile>,
+}
+
+/// Generalised aerodynamic forces at one flight time, per unit dynamic pressure:
+/// `Q = q (stiffness · x + damping · ẋ)`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AerodynamicMatrixFile {
+    /// Flight time, s.
+    pub flight_time_s: f64,
+    /// Coordinates of rows and columns: modal labels, or `xi.y`, `theta.z`, ….
+    #[schemars(length(min = 1))]
+    pub coordinates: Vec<String>,
+    /// Force per displacement and dynamic pressure, a row per coordinate.
+    pub stiffness: Vec<Vec<f64>>,
+    /// Force per rate and dynamic pressure, a row per coordinate.
+    pub damping: Vec<Vec<f64>>,
 }
 
 /// The elastic structure.

@@ -231,6 +231,7 @@ mod tests {
         let modal = Modal {
             source: String::new(),
             contains_engines: Vec::new(),
+            contains_tanks: Vec::new(),
             sets: sets.to_vec(),
             parents,
         };

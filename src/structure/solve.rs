@@ -127,6 +127,7 @@ pub fn solve(
     let modal = Modal {
         source: format!("stick model: {}", stick.name),
         contains_engines: Vec::new(),
+        contains_tanks: Vec::new(),
         sets,
         parents,
     };

@@ -1,14 +1,20 @@
 //! The vehicle: validated values, with no randomness, no files and no equations.
 
 pub mod actuator;
+pub mod aerodynamics;
 pub mod engine;
 pub mod motor;
 pub mod package;
+pub mod tank;
 
 pub use actuator::{Actuator, Bearing, SecondOrder};
+pub use aerodynamics::Aerodynamics;
 pub use engine::{Ablation, Engine, Nozzle};
 pub use motor::Motor;
 pub use package::{Grid, MassProperties, Modal, Mode, ModeSet, Parent};
+pub use tank::{Slosh, Tank};
+
+use nalgebra::Vector3;
 
 /// Standard gravity, m/s² (CGPM 1901), by which a specific impulse in seconds is defined.
 pub const STANDARD_GRAVITY_M_S2: f64 = 9.806_65;
@@ -26,8 +32,32 @@ pub struct Vehicle {
     pub named_modes: Vec<NamedMode>,
     /// Engines in file order.
     pub engines: Vec<Engine>,
+    /// Tanks in file order.
+    pub tanks: Vec<Tank>,
+    /// Aerodynamics, if any.
+    pub aerodynamics: Option<Aerodynamics>,
     /// Modes per flight time.
     pub modal: Modal,
+}
+
+impl Vehicle {
+    /// Modulus of the nominal mean acceleration at the flight time of `set`, m/s²: `Σ R u` over the
+    /// mass of the body and of what its modes do not contain.
+    pub fn nominal_acceleration_m_s2(&self, set: &ModeSet) -> f64 {
+        let time_s = set.flight_time_s;
+        let mut mass = set.body.mass_kg;
+        let mut force = Vector3::zeros();
+        for engine in &self.engines {
+            force += engine.thrust_direction * engine.motor.thrust_at(time_s);
+            if !engine.in_modes {
+                mass += engine.nozzle.mass_kg;
+            }
+        }
+        mass += (self.tanks.iter().filter(|tank| !tank.in_modes))
+            .map(|tank| tank.mass_kg(time_s))
+            .sum::<f64>();
+        force.norm() / mass
+    }
 }
 
 /// A mode of interest by name.

@@ -87,6 +87,8 @@ pub struct Modal {
     pub source: String,
     /// Engines (paths `group.name`) whose mass the modes contain; empty for a reduced body.
     pub contains_engines: Vec<String>,
+    /// Tanks whose slosh masses the modes contain, locked; empty for a reduced body.
+    pub contains_tanks: Vec<String>,
     /// Mode sets by ascending flight time.
     pub sets: Vec<ModeSet>,
     /// Parents of labels born after the first flight time.

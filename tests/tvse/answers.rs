@@ -253,7 +253,10 @@ fn integrated(vehicle: &Vehicle, definition: &Definition) -> (Modal, String) {
     let sets = vec![ModeSet { body, modes: modes.collect(), ..set.clone() }];
     let contains_engines = vehicle.engines.iter().map(|engine| engine.path()).collect();
     let source = "integrated body".to_owned();
-    (Modal { source, contains_engines, sets, parents: Vec::new() }, label(nearest))
+    (
+        Modal { source, contains_engines, contains_tanks: Vec::new(), sets, parents: Vec::new() },
+        label(nearest),
+    )
 }
 
 /// A study whose vehicle has the integrated body of the reference vehicle at 110 s, undamped.

@@ -4,7 +4,8 @@ use super::*;
 use crate::dynamics::{
     Attachment, DrawnBody, DrawnEngine, DrawnVehicle, Effects, Layout, Model, Plant,
 };
-use nalgebra::{Matrix3x2, Vector3};
+use crate::vehicle::MassProperties;
+use nalgebra::{Matrix3, Matrix3x2, Vector3};
 use proptest::prelude::*;
 
 /// The pair of verification case 4.
@@ -229,7 +230,11 @@ fn the_pair_is_the_three_dimensional_model_of_one_engine_and_one_mode() {
     let axes = Matrix3x2::from_columns(&[Vector3::y(), Vector3::z()]);
     let plant = Plant {
         layout: Layout::new(["m001"], [("one.engine".to_owned(), ["rock", "tilt"], true)]),
-        body_mass_kg: body_mass,
+        body: MassProperties {
+            mass_kg: body_mass,
+            cg_m: Vector3::zeros(),
+            inertia_kg_m2: Matrix3::zeros(),
+        },
         attachments: vec![Attachment {
             thrust_direction: -Vector3::x(),
             axes,
@@ -238,9 +243,15 @@ fn the_pair_is_the_three_dimensional_model_of_one_engine_and_one_mode() {
             case_per_flow: Vec::new(),
             in_modes: false,
         }],
+        tanks: Vec::new(),
+        aerodynamics: None,
     };
     let drawn = DrawnVehicle {
-        body: DrawnBody { frequency_rad_s: vec![omega], damping_ratio: vec![zeta] },
+        body: DrawnBody {
+            frequency_rad_s: vec![omega],
+            damping_ratio: vec![zeta],
+            ..DrawnBody::default()
+        },
         engines: vec![DrawnEngine {
             thrust_n: thrust,
             mass_flow_kg_s: flow,
@@ -254,6 +265,8 @@ fn the_pair_is_the_three_dimensional_model_of_one_engine_and_one_mode() {
             shape_gain: vec![1.0],
             slope_gain: vec![1.0],
         }],
+        tanks: Vec::new(),
+        aerodynamics: None,
     };
     // The mean acceleration stiffens the gimbal by m g0 r, g0 = R/M.
     let stiffness = k + m * r * thrust / (body_mass + m);
@@ -264,6 +277,7 @@ fn the_pair_is_the_three_dimensional_model_of_one_engine_and_one_mode() {
             case_jet_damping: false,
             nozzle_jet_damping: nozzle_jet,
             follower_thrust: false,
+            aerodynamics: 0.0,
         };
         let mut model = Model::zeros(plant.layout.coordinates());
         plant.assemble(&drawn, &effects, &mut model);

@@ -35,6 +35,7 @@ fn modal() -> Modal {
     Modal {
         source: "a trial with \"quotes\"".to_owned(),
         contains_engines: vec!["booster.left".to_owned()],
+        contains_tanks: Vec::new(),
         sets: vec![set(95.0, ["m001", "m002"]), set(100.5, ["m001", "m003"])],
         parents: vec![Parent {
             flight_time_s: 100.5,
@@ -152,7 +153,7 @@ fn all_problems_of_a_header_are_told_at_once() {
         header.frame = "z up".to_owned();
         header.normalisation = "maximum".to_owned();
         header.contains_engines = vec!["a.b".to_owned(), "a.b".to_owned()];
-        header.contains_tanks = vec!["lox".to_owned()];
+        header.contains_tanks = vec!["lox".to_owned(), "lox".to_owned()];
         header.blake3.insert("shape".to_owned(), String::new());
     });
     assert_eq!(problems.0.len(), 7);

@@ -1,0 +1,89 @@
+//! Aerodynamics at one flight condition: normal force, pitch and roll damping of the rigid vehicle,
+//! and generalised matrices supplied with it.
+//!
+//! Quasi-steady and linear about zero angle of attack; where its numbers come from is decided in
+//! `vehicle::aerodynamics`.
+
+use super::drawn::DrawnAerodynamics;
+use super::{Layout, Model};
+use nalgebra::Vector3;
+
+/// Entry of a generalised aerodynamic matrix: force on coordinate `row` per unit dynamic pressure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Coordinate of the force.
+    pub row: usize,
+    /// Coordinate of the motion.
+    pub column: usize,
+    /// Force per displacement and dynamic pressure (m² in SI units between modes per kg).
+    pub stiffness: f64,
+    /// Force per rate and dynamic pressure.
+    pub damping: f64,
+}
+
+/// The aerodynamics of one vehicle at one flight time, fixed for all draws.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AerodynamicPlant {
+    /// Position of the vehicle's reference (its cg), structural frame, m.
+    pub reference_m: Vector3<f64>,
+    /// Reference area S, m².
+    pub area_m2: f64,
+    /// Reference length D, m.
+    pub length_m: f64,
+    /// Speed V, m/s.
+    pub speed_m_s: f64,
+    /// Generalised matrices.
+    pub entries: Vec<Entry>,
+}
+
+impl AerodynamicPlant {
+    /// Axial force (drag) `q S C_A`, N, which acts along +x.
+    pub fn drag_n(&self, drawn: &DrawnAerodynamics) -> f64 {
+        drawn.dynamic_pressure_pa * self.area_m2 * drawn.axial_force
+    }
+
+    /// Adds forces and moments, scaled by `factor`, to the model.
+    ///
+    /// The body's transverse velocity relative to the air at the centre of pressure, `x_cp` aft of the
+    /// reference, is `w_y = ξ̇_y + V θ_z + x_cp θ̇_z` and `w_z = ξ̇_z − V θ_y − x_cp θ̇_y`; the normal
+    /// force is `−q S C_Nα w/V` there. The axial force `A = q S C_A x̂` turns with the body: `θ × A` on the
+    /// translation. Damping moments are `q S D²/(2V) C_mq θ̇` in pitch and yaw
+    /// and the same with C_lp in roll (coefficients negative where they damp).
+    pub fn add(&self, drawn: &DrawnAerodynamics, factor: f64, layout: &Layout, model: &mut Model) {
+        let pressure = factor * drawn.dynamic_pressure_pa;
+        for entry in &self.entries {
+            let at = (entry.row, entry.column);
+            model.stiffness[at] -= pressure * entry.stiffness;
+            model.damping[at] -= pressure * entry.damping;
+        }
+        let (translation, rotation) = (layout.translation(), layout.rotation());
+        if rotation.is_empty() {
+            return;
+        }
+        let normal = pressure * self.area_m2 * drawn.normal_force_slope_1_rad;
+        let arm = drawn.center_of_pressure_x_m - self.reference_m.x;
+        // Axis of the force, axis of the rotation that turns the body into it, and their sign.
+        for (axis, turn, sign) in [(1, 2, 1.0), (2, 1, -1.0)] {
+            let (force, angle) = (translation.start + axis, rotation.start + turn);
+            // Moment of a force along `axis` at the arm about `turn` is sign · arm · force.
+            for (row, lever) in [(force, 1.0), (angle, sign * arm)] {
+                model.stiffness[(row, angle)] += lever * normal * sign;
+                model.damping[(row, force)] += lever * normal / self.speed_m_s;
+                model.damping[(row, angle)] += lever * normal * sign * arm / self.speed_m_s;
+            }
+        }
+        let axial = Vector3::x() * (factor * self.drag_n(drawn));
+        for (axis, angle) in rotation.clone().enumerate() {
+            let force = axial.cross(&Vector3::ith(axis, 1.0));
+            for (row, force) in translation.clone().zip(force.iter()) {
+                model.stiffness[(row, angle)] += force;
+            }
+        }
+        let damping =
+            pressure * self.area_m2 * self.length_m * self.length_m / (2.0 * self.speed_m_s);
+        let coefficients = [drawn.roll_damping, drawn.pitch_damping, drawn.pitch_damping];
+        for (angle, coefficient) in rotation.zip(coefficients) {
+            model.damping[(angle, angle)] -= damping * coefficient;
+        }
+    }
+}
