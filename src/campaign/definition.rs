@@ -1,6 +1,6 @@
 //! What a campaign is asked to do: cases, seed, flight times, variants and modes of interest.
 
-pub use crate::dynamics::NozzleJet;
+pub use crate::dynamics::{Feedback, NozzleJet};
 
 use serde::{Deserialize, Serialize};
 
@@ -41,6 +41,12 @@ pub struct Variant {
     /// Aerodynamic forces on.
     #[serde(default)]
     pub aerodynamics: bool,
+    /// What the autopilot does.
+    #[serde(default)]
+    pub feedback: Feedback,
+    /// Set of actuators in the place of the engines' own; engines without it keep theirs.
+    #[serde(default)]
+    pub actuators: Option<String>,
 }
 
 /// A set of cases evaluated in one run; tables hold populations in this order.

@@ -4,11 +4,12 @@
 //! impulse, ablation follows the unablated nozzle, damping coefficients follow the reference
 //! inertia. What the drawn numbers do to the motion is decided in `dynamics`.
 
+use super::draw_servo::{self, Target};
 use super::{Failure, FailureKind};
 use crate::dispersion::{Affine, Parameters, Place, Quantity};
 use crate::dynamics::{DrawnAerodynamics, DrawnBody, DrawnEngine, DrawnTank, DrawnVehicle};
 use crate::vehicle::motor::interpolate;
-use crate::vehicle::{Aerodynamics, Bearing, Engine, ModeSet, STANDARD_GRAVITY_M_S2, Vehicle};
+use crate::vehicle::{Aerodynamics, Engine, ModeSet, STANDARD_GRAVITY_M_S2, Vehicle};
 use std::f64::consts::TAU;
 
 /// Where the parameters of one flight time stand among the effects of a case.
@@ -20,6 +21,8 @@ pub struct Slots {
     structural_damping: usize,
     modes: Vec<ModeSlots>,
     engines: Vec<EngineSlots>,
+    /// Slope gain per sensor and mode.
+    sensors: Vec<Vec<usize>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -67,6 +70,13 @@ impl Slots {
             modes,
             engines: (0..vehicle.engines.len())
                 .map(|engine| EngineSlots { engine, gains: gains(engine) })
+                .collect(),
+            sensors: (0..vehicle.autopilot.as_ref().map_or(0, |a| a.sensors.len()))
+                .map(|sensor| {
+                    let place = |label: &usize| Place::SensorMode(sensor, *label);
+                    let index = |label| parameters.index(Quantity::SensorSlope, place(label));
+                    labels.iter().map(index).collect()
+                })
                 .collect(),
         }
     }
@@ -119,19 +129,34 @@ impl Slots {
             let of = |quantity, nominal| {
                 value(parameters.index(quantity, Place::Engine(slots.engine)), nominal)
             };
-            let actuator = |axis, quantity, nominal| {
-                value(parameters.index(quantity, Place::Actuator(slots.engine, axis)), nominal)
+            let actuator = |number, quantity, nominal| {
+                value(parameters.index(quantity, Place::Actuator(slots.engine, number)), nominal)
             };
             let to = &mut drawn.engines[slots.engine];
             self.draw_flow(engine, to, &of)?;
             self.draw_nozzle(engine, to, &of)?;
-            draw_gimbal(engine, to, &of, &actuator)?;
+            draw_servo::actuators(engine, to, &of, &actuator)?;
             to.shape_gain.clear();
             to.slope_gain.clear();
             for [shape, slope] in &slots.gains {
                 to.shape_gain.push(value(*shape, 1.0)?);
                 to.slope_gain.push(value(*slope, 1.0)?);
             }
+        }
+        if let Some(autopilot) = &vehicle.autopilot {
+            let target = |target: Target, nominal: f64| {
+                let index = match target {
+                    Target::Delay => parameters.index(Quantity::LoopDelay, Place::Vehicle),
+                    Target::Scale(s) => parameters.index(Quantity::SensorScale, Place::Sensor(s)),
+                    Target::Slope(sensor, mode) => self.sensors[sensor][mode],
+                    Target::Gain(p) => parameters.index(Quantity::PathGain, Place::Path(p)),
+                    Target::Filter(quantity, p, f) => {
+                        parameters.index(quantity, Place::Filter(p, f))
+                    }
+                };
+                value(index, nominal)
+            };
+            draw_servo::autopilot(autopilot, self.modes.len(), &mut drawn.autopilot, &target)?;
         }
         Ok(())
     }
@@ -224,28 +249,4 @@ impl Slots {
         positive("nozzle mass after ablation", to.mass_kg)?;
         positive("nozzle inertia about its cg, J_G − m r²,", to.central_inertia_kg_m2())
     }
-}
-
-/// K_a and C_a = 2 ζ √(J_ref K_nom), and the flex bearing where it is separate.
-fn draw_gimbal(
-    engine: &Engine,
-    to: &mut DrawnEngine,
-    of: &impl Fn(Quantity, f64) -> Result<f64, Failure>,
-    actuator: &impl Fn(usize, Quantity, f64) -> Result<f64, Failure>,
-) -> Result<(), Failure> {
-    let bearing_stiffness = of(Quantity::BearingStiffness, engine.bearing_stiffness_n_m_rad)?;
-    let bearing_damping = of(Quantity::BearingDamping, engine.bearing_damping_n_m_s_rad)?;
-    for (axis, nominal) in engine.actuators.iter().enumerate() {
-        let law = &nominal.law;
-        let stiffness = actuator(axis, Quantity::ActuatorStiffness, law.stiffness_n_m_rad)?;
-        let ratio = actuator(axis, Quantity::ActuatorDamping, law.damping_ratio)?;
-        let critical = (law.reference_inertia_kg_m2 * law.stiffness_n_m_rad).sqrt();
-        let separate = match nominal.bearing {
-            Bearing::Included => 0.0,
-            Bearing::Separate => bearing_stiffness,
-        };
-        to.gimbal_stiffness_n_m_rad[axis] = stiffness + separate;
-        to.gimbal_damping_n_m_s_rad[axis] = 2.0 * ratio * critical + bearing_damping;
-    }
-    Ok(())
 }

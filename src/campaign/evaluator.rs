@@ -397,6 +397,7 @@ fn at_variant(
         nozzle_jet_damping: variant.nozzle_jet_damping,
         follower_thrust: variant.follower_thrust,
         aerodynamics: if variant.aerodynamics { 1.0 } else { 0.0 },
+        feedback: 1.0,
     };
     let size = plant.layout.coordinates();
     let mut solver = Solver::new(size);

@@ -3,6 +3,7 @@
 pub mod corner;
 pub mod definition;
 pub mod draw;
+mod draw_servo;
 pub mod evaluator;
 pub mod metric;
 pub mod outline;

@@ -7,7 +7,7 @@ use crate::dynamics::aerodynamics::{AerodynamicPlant, Entry};
 use crate::dynamics::attached::rigid_motion;
 use crate::dynamics::jet_damping::{Station, case_per_flow};
 use crate::dynamics::virtual_grid::{Geometry, VirtualGrid};
-use crate::dynamics::{Attachment, Layout, Plant, TankAttachment};
+use crate::dynamics::{Attachment, Feedback, Layout, Plant, Servo, TankAttachment, servo};
 use crate::vehicle::motor::interpolate;
 use crate::vehicle::{Aerodynamics, Engine, Mode, ModeSet, Tank, Vehicle};
 use nalgebra::{Matrix3x2, Vector3};
@@ -33,11 +33,14 @@ pub enum Error {
         /// Why.
         source: crate::dynamics::virtual_grid::Degenerate,
     },
+    /// Actuators and autopilot cannot be connected.
+    #[error("{0}")]
+    Servo(#[from] servo::Error),
 }
 
 /// What of a vehicle is free to move and acts, as far as it decides the coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Extent {
+pub struct Extent<'a> {
     /// Gimbal slope.
     pub slope: Slope,
     /// Rigid translation and rotation.
@@ -46,13 +49,18 @@ pub struct Extent {
     pub slosh: bool,
     /// Aerodynamic forces.
     pub aerodynamics: bool,
+    /// What the autopilot does.
+    pub feedback: Feedback,
+    /// Set of actuators in the place of the engines' own.
+    pub actuators: Option<&'a str>,
 }
 
-impl Extent {
+impl<'a> Extent<'a> {
     /// The extent of a variant.
-    pub fn of(variant: &Variant) -> Self {
-        let Variant { slope, rigid_body, slosh, aerodynamics, .. } = *variant;
-        Self { slope, rigid_body, slosh, aerodynamics }
+    pub fn of(variant: &'a Variant) -> Self {
+        let Variant { slope, rigid_body, slosh, aerodynamics, feedback, .. } = *variant;
+        let actuators = variant.actuators.as_deref();
+        Self { slope, rigid_body, slosh, aerodynamics, feedback, actuators }
     }
 }
 
@@ -64,7 +72,7 @@ pub fn plant(
     vehicle: &Vehicle,
     set: &ModeSet,
     gimballed: &[bool],
-    extent: Extent,
+    extent: Extent<'_>,
 ) -> Result<Plant, Error> {
     let engines = vehicle.engines.iter().zip(gimballed).map(|(engine, &gimballed)| {
         let [first, second] = &engine.actuators;
@@ -83,7 +91,10 @@ pub fn plant(
         .collect::<Result<Vec<_>, _>>()?;
     let air = vehicle.aerodynamics.as_ref().filter(|_| extent.aerodynamics);
     let aerodynamics = air.map(|air| aerodynamic_plant(air, set, &layout));
-    Ok(Plant { layout, body: set.body, attachments, tanks, aerodynamics })
+    let servo = Servo::new(vehicle, set, gimballed, extent.feedback, extent.actuators)?;
+    let layout =
+        layout.with_states(if servo.is_active() { servo.states().to_vec() } else { Vec::new() });
+    Ok(Plant { layout, body: set.body, attachments, tanks, aerodynamics, servo: Some(servo) })
 }
 
 /// Translation and rotation of a point of the body per body coordinate: the rigid columns where the
@@ -99,7 +110,11 @@ fn body_motion<'a>(
     rigid.chain(set.modes.iter().map(of_mode)).unzip()
 }
 
-fn tank_attachment(tank: &Tank, set: &ModeSet, extent: Extent) -> Result<TankAttachment, Error> {
+fn tank_attachment(
+    tank: &Tank,
+    set: &ModeSet,
+    extent: Extent<'_>,
+) -> Result<TankAttachment, Error> {
     let grid = set.grid(&tank.grid).ok_or_else(|| Error::MissingGrid {
         part: format!("tank {}", tank.name),
         grid: tank.grid.clone(),
@@ -139,7 +154,7 @@ fn aerodynamic_plant(air: &Aerodynamics, set: &ModeSet, layout: &Layout) -> Aero
     }
 }
 
-fn attachment(engine: &Engine, set: &ModeSet, extent: Extent) -> Result<Attachment, Error> {
+fn attachment(engine: &Engine, set: &ModeSet, extent: Extent<'_>) -> Result<Attachment, Error> {
     let grid = |name: &str| {
         set.grid(name).ok_or_else(|| Error::MissingGrid {
             part: engine.path(),
@@ -175,6 +190,7 @@ fn attachment(engine: &Engine, set: &ModeSet, extent: Extent) -> Result<Attachme
         slope,
         case_per_flow: case(engine, set, extent.rigid_body, grid)?,
         in_modes: engine.in_modes,
+        actuators: engine.set(extent.actuators),
     })
 }
 

@@ -3,7 +3,7 @@
 //! No physics: the numbers only have to be unlike each other and to include failures, unstable
 //! poles and pairs of poles that exchange character.
 
-use super::definition::{Definition, NozzleJet, Population, Slope, Variant};
+use super::definition::{Definition, Feedback, NozzleJet, Population, Slope, Variant};
 use super::outline::{DrawColumn, Input, Outline, StoredPoles};
 use super::record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};
 use nalgebra::Complex;
@@ -20,6 +20,8 @@ pub fn definition(cases: &[u64]) -> Definition {
         rigid_body: false,
         slosh: false,
         aerodynamics: false,
+        feedback: Feedback::Open,
+        actuators: None,
     };
     let names = ["nominal", "dispersed", "corner_dispersed"];
     let population = |(index, &cases): (usize, &u64)| Population {

@@ -1,7 +1,7 @@
 //! A small vehicle for the tests of this module; nothing but tests uses it.
 
 use crate::vehicle::{
-    Ablation, Actuator, Bearing, Engine, MassProperties, Modal, Mode, ModeSet, Motor, Nozzle,
+    Ablation, Actuator, Bearing, Engine, Law, MassProperties, Modal, Mode, ModeSet, Motor, Nozzle,
     Parent, SecondOrder, Vehicle,
 };
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
@@ -14,11 +14,11 @@ fn actuator(name: &str, bearing: Bearing) -> Actuator {
         attach_m: Vector3::new(0.0, 1.0, 0.0),
         action_line: Vector3::x(),
         bearing,
-        law: SecondOrder {
+        law: Law::SecondOrder(SecondOrder {
             stiffness_n_m_rad: 3.76e7,
             damping_ratio: 0.3,
             reference_inertia_kg_m2: 24_000.0,
-        },
+        }),
     }
 }
 
@@ -54,6 +54,7 @@ pub fn engine(group: &str, name: &str, bearing: Bearing) -> Engine {
         bearing_stiffness_n_m_rad: 2.0e6,
         bearing_damping_n_m_s_rad: 0.0,
         actuators: [actuator("rock", bearing), actuator("tilt", bearing)],
+        alternatives: Vec::new(),
         case_stations: Vec::new(),
         in_modes: false,
     }
@@ -88,6 +89,7 @@ fn with_modes(sets: Vec<ModeSet>, parents: Vec<Parent>) -> Vehicle {
             engine("booster", "left", Bearing::Included),
             engine("booster", "right", Bearing::Included),
         ],
+        autopilot: None,
         tanks: Vec::new(),
         aerodynamics: None,
         modal: Modal {

@@ -3,7 +3,7 @@
 //! The registry line of a quantity is all there is to say about it: its TOML path, unit, bounds,
 //! Parquet column and report text derive from it. Laws and rows are not known here.
 
-use crate::vehicle::{Modal, Vehicle};
+use crate::vehicle::{Law, Modal, Vehicle};
 
 /// Physical values a quantity may take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,10 +51,18 @@ pub enum Scope {
     Tank,
     /// Engine and modal label: the gimbal's part in a mode.
     Gimbal,
+    /// Sensor of the autopilot.
+    Sensor,
+    /// Sensor and modal label.
+    SensorMode,
+    /// Path of the autopilot.
+    Path,
+    /// Filter of a path.
+    Filter,
 }
 
 /// One instance of a scope. Indices: engines as in [`Vehicle::engines`], actuators as in
-/// `Engine::actuators`, labels as in [`Modal::labels`].
+/// `Engine::actuator`, labels as in [`Modal::labels`], sensors, paths and filters as in the autopilot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
     /// The vehicle.
@@ -69,6 +77,14 @@ pub enum Place {
     Tank(usize),
     /// Engine and modal label.
     Gimbal(usize, usize),
+    /// A sensor.
+    Sensor(usize),
+    /// Sensor and modal label.
+    SensorMode(usize, usize),
+    /// A path.
+    Path(usize),
+    /// Path and filter.
+    Filter(usize, usize),
 }
 
 /// What the registry says about a quantity.
@@ -128,10 +144,30 @@ registry! {
     NozzleAblation, Engine, "<group>.<engine>.nozzle.ablation", "1", NonNegative, "liner ablation factor a: the share of the loss given for full burn";
     BearingStiffness, Engine, "<group>.<engine>.bearing.stiffness", "N m/rad", NonNegative, "flex bearing stiffness of an actuator that does not include it";
     BearingDamping, Engine, "<group>.<engine>.bearing.damping", "N m s/rad", NonNegative, "flex bearing damping";
-    ActuatorStiffness, Actuator, "<group>.<engine>.actuator.<actuator>.stiffness", "N m/rad", Positive, "actuator stiffness K_a";
-    ActuatorDamping, Actuator, "<group>.<engine>.actuator.<actuator>.damping", "1", NonNegative, "actuator damping ratio at the reference inertia";
+    ActuatorStiffness, Actuator, "<group>.<engine>.actuator.<actuator>.stiffness", "N m/rad", Positive, "stiffness K_a of a second-order actuator";
+    ActuatorDamping, Actuator, "<group>.<engine>.actuator.<actuator>.damping", "1", NonNegative, "damping ratio of a second-order actuator at the reference inertia";
+    ActuatorArm, Actuator, "<group>.<engine>.actuator.<actuator>.arm", "m", Positive, "moment arm of an electrohydraulic actuator";
+    PistonArea, Actuator, "<group>.<engine>.actuator.<actuator>.piston_area", "m2", Positive, "piston area of an electrohydraulic actuator";
+    LoadPathStiffness, Actuator, "<group>.<engine>.actuator.<actuator>.load_path_stiffness", "N/m", Positive, "load path stiffness of an electrohydraulic actuator";
+    OilStiffness, Actuator, "<group>.<engine>.actuator.<actuator>.oil_stiffness", "N/m", Positive, "oil stiffness of an electrohydraulic actuator";
+    Leakage, Actuator, "<group>.<engine>.actuator.<actuator>.leakage", "m3/(s Pa)", NonNegative, "leakage past the piston of an electrohydraulic actuator";
+    ValveFlowGain, Actuator, "<group>.<engine>.actuator.<actuator>.valve_flow_gain", "m3/(s A)", Positive, "flow gain of the servo valve of an electrohydraulic actuator";
+    ValvePressureGain, Actuator, "<group>.<engine>.actuator.<actuator>.valve_pressure_gain", "Pa/A", Positive, "pressure gain of the servo valve of an electrohydraulic actuator";
+    PositionGain, Actuator, "<group>.<engine>.actuator.<actuator>.position_gain", "A/m", Positive, "position loop gain of an electrohydraulic actuator";
+    PressureFeedback, Actuator, "<group>.<engine>.actuator.<actuator>.pressure_feedback", "A/Pa", NonNegative, "gain of the dynamic pressure feedback of an electrohydraulic actuator";
+    PressureCorner, Actuator, "<group>.<engine>.actuator.<actuator>.pressure_corner", "Hz", Positive, "corner of the high pass in the pressure feedback of an electrohydraulic actuator";
+    ActuatorGain, Actuator, "<group>.<engine>.actuator.<actuator>.gain", "1", Any, "gain on an actuator given by transfer functions or matrices, nominal 1";
+    ActuatorTimeScale, Actuator, "<group>.<engine>.actuator.<actuator>.time_scale", "1", Positive, "factor on the time constants of an actuator given by transfer functions or matrices, nominal 1";
     GimbalShape, Gimbal, "<group>.<engine>.gimbal.<label>.shape", "1", Any, "gain on the gimbal translation of a mode, nominal 1";
     GimbalSlope, Gimbal, "<group>.<engine>.gimbal.<label>.slope", "1", Any, "gain on the gimbal rotation of a mode, nominal 1";
+    LoopDelay, Vehicle, "autopilot.delay", "s", Positive, "loop delay of the autopilot";
+    SensorScale, Sensor, "autopilot.sensor.<sensor>.scale", "1", Any, "scale factor of a sensor of the autopilot";
+    SensorSlope, SensorMode, "autopilot.sensor.<sensor>.<label>.slope", "1", Any, "gain on the slope of a mode at the grid of a sensor, nominal 1";
+    PathGain, Path, "autopilot.path.<path>.gain", "1", Any, "gain of a path of the autopilot";
+    FilterGain, Filter, "autopilot.path.<path>.filter.<filter>.gain", "1", Any, "gain on a filter of the autopilot, nominal 1";
+    FilterFrequency, Filter, "autopilot.path.<path>.filter.<filter>.frequency", "1", Positive, "factor on the frequencies of a filter of the autopilot, nominal 1";
+    FilterDamping, Filter, "autopilot.path.<path>.filter.<filter>.damping", "1", NonNegative, "factor on the damping ratios of a filter of the autopilot, nominal 1";
+    FilterDelay, Filter, "autopilot.path.<path>.filter.<filter>.delay", "s", Positive, "delay of a filter of the autopilot";
     SloshMass, Tank, "tank.<tank>.slosh.mass", "kg", NonNegative, "slosh mass of a tank, table in flight time";
     SloshFrequency, Tank, "tank.<tank>.slosh.frequency", "Hz", Positive, "slosh frequency of a tank under the nominal mean acceleration, table in flight time";
     SloshDamping, Tank, "tank.<tank>.slosh.damping", "1", NonNegative, "slosh damping ratio of a tank";
@@ -147,22 +183,57 @@ registry! {
 }
 
 impl Quantity {
-    /// Whether this instance exists: a nozzle without a liner has nothing to ablate.
+    /// Whether this instance exists: a nozzle without a liner has nothing to ablate, and each kind of
+    /// actuator and filter has its own numbers.
     fn exists(self, vehicle: &Vehicle, place: Place) -> bool {
-        match (self, place) {
-            (Self::NozzleAblation, Place::Engine(e)) => {
+        match place {
+            Place::Engine(e) if self == Self::NozzleAblation => {
                 vehicle.engines[e].nozzle.ablation.is_some()
             }
-            (
+            Place::Actuator(e, a) => self.is_of(&vehicle.engines[e].actuator(a).law),
+            Place::Filter(p, f) => vehicle.autopilot.as_ref().is_some_and(|autopilot| {
+                let kind = &autopilot.paths[p].filters[f].kind;
+                match self {
+                    Self::FilterFrequency => kind.has_frequency(),
+                    Self::FilterDamping => kind.has_damping(),
+                    Self::FilterDelay => kind.has_delay(),
+                    _ => true,
+                }
+            }),
+            Place::Vehicle => match self {
+                Self::LoopDelay => vehicle.autopilot.as_ref().is_some_and(|a| a.delay_s > 0.0),
                 Self::DynamicPressure
                 | Self::NormalForceSlope
                 | Self::CenterOfPressure
                 | Self::AxialForce
                 | Self::PitchDamping
-                | Self::RollDamping,
-                _,
-            ) => vehicle.aerodynamics.is_some(),
+                | Self::RollDamping => vehicle.aerodynamics.is_some(),
+                _ => true,
+            },
             _ => true,
+        }
+    }
+
+    /// Whether a torque law has this quantity.
+    fn is_of(self, law: &Law) -> bool {
+        match law {
+            Law::SecondOrder(_) => matches!(self, Self::ActuatorStiffness | Self::ActuatorDamping),
+            Law::Electrohydraulic(law) => match self {
+                Self::ValvePressureGain => law.valve_pressure_gain_pa_a.is_finite(),
+                Self::PressureCorner => law.pressure_corner_rad_s > 0.0,
+                Self::ActuatorArm
+                | Self::PistonArea
+                | Self::LoadPathStiffness
+                | Self::OilStiffness
+                | Self::Leakage
+                | Self::ValveFlowGain
+                | Self::PositionGain
+                | Self::PressureFeedback => true,
+                _ => false,
+            },
+            Law::TransferFunction(_) | Law::StateSpace(_) => {
+                matches!(self, Self::ActuatorGain | Self::ActuatorTimeScale)
+            }
         }
     }
 }
@@ -215,6 +286,11 @@ struct Label {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
     engines: usize,
+    /// Number of the first actuator of each engine, and of all.
+    actuators: Vec<usize>,
+    sensors: usize,
+    /// Number of the first filter of each path, and of all.
+    filters: Vec<usize>,
     tanks: usize,
     labels: Vec<Label>,
     /// Number of the first parameter of each quantity.
@@ -222,8 +298,20 @@ pub struct Parameters {
     all: Vec<Parameter>,
 }
 
-/// Actuators an engine has: one per gimbal axis.
-const ACTUATORS: usize = 2;
+/// Number of the first member of each, and of all.
+fn starts(counts: impl Iterator<Item = usize>) -> Vec<usize> {
+    let mut starts = vec![0];
+    for count in counts {
+        starts.push(starts[starts.len() - 1] + count);
+    }
+    starts
+}
+
+/// Every pair of an owner and one of its members, by the numbers of the first members.
+fn members(starts: &[usize]) -> impl Iterator<Item = (usize, usize)> {
+    let counts = starts.windows(2).map(|pair| pair[1] - pair[0]).enumerate();
+    counts.flat_map(|(owner, count)| (0..count).map(move |member| (owner, member)))
+}
 
 impl Parameters {
     /// The parameters of `vehicle`, ordered by quantity, then engine, then actuator or label.
@@ -245,8 +333,13 @@ impl Parameters {
                 }
             })
             .collect();
+        let autopilot = vehicle.autopilot.as_ref();
+        let paths = autopilot.map_or(&[][..], |autopilot| &autopilot.paths);
         let mut parameters = Self {
             engines: vehicle.engines.len(),
+            actuators: starts(vehicle.engines.iter().map(|engine| 2 * engine.sets().count())),
+            sensors: autopilot.map_or(0, |autopilot| autopilot.sensors.len()),
+            filters: starts(paths.iter().map(|path| path.filters.len())),
             tanks: vehicle.tanks.len(),
             labels,
             first: Vec::new(),
@@ -270,12 +363,18 @@ impl Parameters {
             Scope::Mode => (0..self.labels.len()).map(Place::Mode).collect(),
             Scope::Engine => engines.map(Place::Engine).collect(),
             Scope::Actuator => {
-                engines.flat_map(|e| (0..ACTUATORS).map(move |a| Place::Actuator(e, a))).collect()
+                members(&self.actuators).map(|(e, a)| Place::Actuator(e, a)).collect()
             }
             Scope::Tank => (0..self.tanks).map(Place::Tank).collect(),
             Scope::Gimbal => engines
                 .flat_map(|e| (0..self.labels.len()).map(move |l| Place::Gimbal(e, l)))
                 .collect(),
+            Scope::Sensor => (0..self.sensors).map(Place::Sensor).collect(),
+            Scope::SensorMode => (0..self.sensors)
+                .flat_map(|s| (0..self.labels.len()).map(move |l| Place::SensorMode(s, l)))
+                .collect(),
+            Scope::Path => (0..self.filters.len() - 1).map(Place::Path).collect(),
+            Scope::Filter => members(&self.filters).map(|(p, f)| Place::Filter(p, f)).collect(),
         }
     }
 
@@ -285,16 +384,26 @@ impl Parameters {
             let engine = &vehicle.engines[e];
             path.replace("<group>", &engine.group).replace("<engine>", &engine.name)
         };
+        let autopilot = || vehicle.autopilot.as_ref().expect("only an autopilot has such places");
         match place {
             Place::Vehicle => path.into(),
             Place::Mode(l) => path.replace("<label>", &self.labels[l].name),
             Place::Engine(e) => engine(path, e),
             Place::Actuator(e, a) => {
-                let name = &vehicle.engines[e].actuators[a].name;
+                let name = &vehicle.engines[e].actuator(a).name;
                 engine(path, e).replace("<actuator>", name)
             }
             Place::Tank(t) => path.replace("<tank>", &vehicle.tanks[t].name),
             Place::Gimbal(e, l) => engine(path, e).replace("<label>", &self.labels[l].name),
+            Place::Sensor(s) => path.replace("<sensor>", &autopilot().sensors[s].name),
+            Place::SensorMode(s, l) => path
+                .replace("<sensor>", &autopilot().sensors[s].name)
+                .replace("<label>", &self.labels[l].name),
+            Place::Path(p) => path.replace("<path>", &autopilot().paths[p].name),
+            Place::Filter(p, f) => {
+                let owner = &autopilot().paths[p];
+                path.replace("<path>", &owner.name).replace("<filter>", &owner.filters[f].name)
+            }
         }
     }
 
@@ -304,9 +413,13 @@ impl Parameters {
             Place::Vehicle => (Scope::Vehicle, 0),
             Place::Mode(l) => (Scope::Mode, l),
             Place::Engine(e) => (Scope::Engine, e),
-            Place::Actuator(e, a) => (Scope::Actuator, e * ACTUATORS + a),
+            Place::Actuator(e, a) => (Scope::Actuator, self.actuators[e] + a),
             Place::Tank(t) => (Scope::Tank, t),
             Place::Gimbal(e, l) => (Scope::Gimbal, e * self.labels.len() + l),
+            Place::Sensor(s) => (Scope::Sensor, s),
+            Place::SensorMode(s, l) => (Scope::SensorMode, s * self.labels.len() + l),
+            Place::Path(p) => (Scope::Path, p),
+            Place::Filter(p, f) => (Scope::Filter, self.filters[p] + f),
         };
         debug_assert_eq!(scope, quantity.definition().scope, "{quantity:?} at {place:?}");
         self.first[quantity as usize] + offset
@@ -345,8 +458,14 @@ impl Place {
     /// Index of the modal label, where the place has one.
     pub fn label(self) -> Option<usize> {
         match self {
-            Self::Mode(l) | Self::Gimbal(_, l) => Some(l),
-            Self::Vehicle | Self::Engine(_) | Self::Actuator(..) | Self::Tank(_) => None,
+            Self::Mode(l) | Self::Gimbal(_, l) | Self::SensorMode(_, l) => Some(l),
+            Self::Vehicle
+            | Self::Engine(_)
+            | Self::Actuator(..)
+            | Self::Tank(_)
+            | Self::Sensor(_)
+            | Self::Path(_)
+            | Self::Filter(..) => None,
         }
     }
 }
@@ -401,6 +520,10 @@ mod tests {
                 Scope::Actuator => &["<group>", "<engine>", "<actuator>"],
                 Scope::Tank => &["<tank>"],
                 Scope::Gimbal => &["<group>", "<engine>", "<label>"],
+                Scope::Sensor => &["<sensor>"],
+                Scope::SensorMode => &["<sensor>", "<label>"],
+                Scope::Path => &["<path>"],
+                Scope::Filter => &["<path>", "<filter>"],
             };
             assert_eq!(variable, expected, "{}", definition.path);
             assert!(!definition.description.is_empty() && !definition.unit.is_empty());

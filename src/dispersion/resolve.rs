@@ -20,10 +20,21 @@ enum Level {
     Engine,
     Actuator,
     Mode,
+    Sensor,
+    Path,
+    Filter,
 }
 
 impl Level {
-    const ALL: [Self; 4] = [Self::Vehicle, Self::Engine, Self::Actuator, Self::Mode];
+    const ALL: [Self; 7] = [
+        Self::Vehicle,
+        Self::Engine,
+        Self::Actuator,
+        Self::Mode,
+        Self::Sensor,
+        Self::Path,
+        Self::Filter,
+    ];
 
     fn name(self) -> &'static str {
         match self {
@@ -31,6 +42,9 @@ impl Level {
             Self::Engine => "engine",
             Self::Actuator => "actuator",
             Self::Mode => "mode",
+            Self::Sensor => "sensor",
+            Self::Path => "path",
+            Self::Filter => "filter",
         }
     }
 
@@ -40,15 +54,19 @@ impl Level {
             Self::Vehicle => true,
             Self::Engine => matches!(scope, Scope::Engine | Scope::Actuator | Scope::Gimbal),
             Self::Actuator => scope == Scope::Actuator,
-            Self::Mode => matches!(scope, Scope::Mode | Scope::Gimbal),
+            Self::Mode => matches!(scope, Scope::Mode | Scope::Gimbal | Scope::SensorMode),
+            Self::Sensor => matches!(scope, Scope::Sensor | Scope::SensorMode),
+            Self::Path => matches!(scope, Scope::Path | Scope::Filter),
+            Self::Filter => scope == Scope::Filter,
         }
     }
 
     /// Whether a wildcard in this place of a template is expanded to the instance.
     fn expands(self, segment: &str) -> bool {
         match segment {
-            "<group>" | "<engine>" => self != Self::Vehicle,
+            "<group>" | "<engine>" | "<sensor>" | "<path>" => self != Self::Vehicle,
             "<actuator>" => self == Self::Actuator,
+            "<filter>" => self == Self::Filter,
             "<label>" => self == Self::Mode,
             _ => false,
         }
@@ -247,8 +265,8 @@ fn matching(
     let Some(&first) = targets.first() else {
         if let Some(&absent) = named.first() {
             let description = all[absent].quantity.definition().description;
-            let allowed = format!("an engine of the vehicle that has one ({description})");
-            at("path", format!("\"{}\", which no engine has", row.path), allowed);
+            let allowed = format!("a part of the vehicle that has one ({description})");
+            at("path", format!("\"{}\", which no part has", row.path), allowed);
         } else {
             at("path", quoted(Some(&row.path)), alternatives(&row.path, vehicle, parameters));
         }
@@ -266,7 +284,7 @@ fn alternatives(path: &str, vehicle: &Vehicle, parameters: &Parameters) -> Strin
     let mut candidates: BTreeSet<String> =
         parameters.all().iter().filter(|p| p.exists).map(|p| p.path.clone()).collect();
     for definition in Quantity::ALL.iter().map(|q| q.definition()) {
-        let wild = ["<engine>", "<actuator>", "<label>"]
+        let wild = ["<engine>", "<actuator>", "<label>", "<sensor>", "<path>", "<filter>"]
             .iter()
             .fold(definition.path.to_string(), |path, segment| path.replace(segment, "*"));
         candidates.extend(groups.iter().map(|group| wild.replace("<group>", group)));
@@ -320,7 +338,8 @@ fn in_band(
     at: &mut dyn FnMut(&str, String, String),
 ) -> Vec<usize> {
     let Some([low, high]) = row.band_hz else { return matched.targets.clone() };
-    if !matches!(matched.quantity.definition().scope, Scope::Mode | Scope::Gimbal) {
+    let scope = matched.quantity.definition().scope;
+    if !matches!(scope, Scope::Mode | Scope::Gimbal | Scope::SensorMode) {
         at("band_hz", format!("[{low}, {high}]"), "no band: the path has no modal label".into());
         return matched.targets.clone();
     }
@@ -361,7 +380,8 @@ fn check_bearing(
         .map(|&target| &parameters.all()[target])
         .filter(|parameter| match parameter.place {
             Place::Engine(e) => {
-                vehicle.engines[e].actuators.iter().all(|a| a.bearing == Bearing::Included)
+                let mut pairs = vehicle.engines[e].sets();
+                pairs.all(|(_, pair)| pair.iter().all(|a| a.bearing == Bearing::Included))
             }
             _ => false,
         })

@@ -35,14 +35,14 @@ pub struct Common {
 #[serde(deny_unknown_fields)]
 pub struct Row {
     /// Parameter path, for instance `booster.left.nozzle.mass`; `*` stands for any group, engine,
-    /// actuator or modal label.
+    /// actuator, modal label, sensor, path or filter.
     pub path: String,
     /// Law of the drawn value.
     pub law: LawText,
     /// How the drawn value acts on the nominal one.
     pub apply: Apply,
     /// Level at which one value is drawn: `vehicle`, `engine` (or the name of the engine group),
-    /// `actuator` or `mode`.
+    /// `actuator`, `mode`, `sensor`, `path` or `filter`.
     pub level: String,
     /// Tells rows apart that would otherwise draw under the same key: letters, digits, `_`, `-`.
     pub id: Option<String>,

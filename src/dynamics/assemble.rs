@@ -9,7 +9,7 @@ use super::drawn::DrawnVehicle;
 use super::engine::Attachment;
 use super::rigid_body::{self, Flow};
 use super::slosh::TankAttachment;
-use super::{Layout, Model};
+use super::{Layout, Model, Servo};
 use crate::vehicle::MassProperties;
 use nalgebra::Vector3;
 
@@ -39,13 +39,20 @@ pub struct Effects {
     pub follower_thrust: bool,
     /// Factor on aerodynamic forces, −.
     pub aerodynamics: f64,
+    /// Factor on the feedback of the autopilot, where it acts, −.
+    pub feedback: f64,
 }
 
 impl Effects {
-    /// The effects with `factor` on everything that drives the structure from outside: thrust, flow
-    /// and air.
+    /// The effects with `factor` on everything that drives the structure from outside: thrust, flow,
+    /// air and autopilot.
     pub fn scaled(self, factor: f64) -> Self {
-        Self { thrust: factor * self.thrust, aerodynamics: factor * self.aerodynamics, ..self }
+        Self {
+            thrust: factor * self.thrust,
+            aerodynamics: factor * self.aerodynamics,
+            feedback: factor * self.feedback,
+            ..self
+        }
     }
 }
 
@@ -62,6 +69,8 @@ pub struct Plant {
     pub tanks: Vec<TankAttachment>,
     /// Aerodynamics, if any.
     pub aerodynamics: Option<AerodynamicPlant>,
+    /// Actuators and autopilot; `None` holds every gimbal by its springs alone, without commands.
+    pub servo: Option<Servo>,
 }
 
 impl Plant {
@@ -121,10 +130,12 @@ impl Plant {
             let own = layout.gimbal(index);
             let columns = Columns::new(layout, own);
             attachment.add(engine, &columns, &acceleration, effects, model);
-            for axis in own.into_iter().flat_map(|first| [first, first + 1]).enumerate() {
-                let (axis, at) = (axis.0, (axis.1, axis.1));
-                model.stiffness[at] += engine.gimbal_stiffness_n_m_rad[axis];
-                model.damping[at] += engine.gimbal_damping_n_m_s_rad[axis];
+            let actuators = &engine.actuators[attachment.actuators];
+            for (at, actuator) in
+                own.into_iter().flat_map(|first| [first, first + 1]).zip(actuators)
+            {
+                model.stiffness[(at, at)] += actuator.stiffness_n_m_rad;
+                model.damping[(at, at)] += actuator.damping_n_m_s_rad;
             }
         }
         for (index, (attachment, tank)) in self.tanks.iter().zip(&drawn.tanks).enumerate() {
@@ -132,6 +143,9 @@ impl Plant {
             attachment.add(tank, &columns, &acceleration, model);
         }
         let still = rigid_body::attitude_columns(layout, model);
+        if let Some(servo) = self.servo.as_ref().filter(|servo| servo.is_active()) {
+            servo.attach(&servo.compose(drawn), drawn, effects.feedback, layout, model);
+        }
         if let (Some(plant), Some(air)) = (&self.aerodynamics, &drawn.aerodynamics) {
             plant.add(air, effects.aerodynamics, layout, model);
         }

@@ -2,7 +2,56 @@
 //!
 //! Where they come from (nominal values and draws) is decided in `campaign`.
 
-use nalgebra::{Matrix3, Vector3};
+use crate::vehicle::{FilterDraw, StateSpace};
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+/// An actuator as drawn, with the flex bearing beside it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DrawnActuator {
+    /// Stiffness directly on the gimbal rotation, N·m/rad: second-order actuator, separate bearing.
+    pub stiffness_n_m_rad: f64,
+    /// Damping directly on the gimbal rotation, N·m·s/rad.
+    pub damping_n_m_s_rad: f64,
+    /// Torque beside them, N·m, from [δ_c, Θ, Θ̇].
+    pub torque: StateSpace,
+}
+
+impl DrawnActuator {
+    /// A spring and a damper between command and nozzle.
+    pub fn spring(stiffness_n_m_rad: f64, damping_n_m_s_rad: f64) -> Self {
+        let command = DMatrix::from_row_slice(1, 3, &[stiffness_n_m_rad, 0.0, 0.0]);
+        Self { stiffness_n_m_rad, damping_n_m_s_rad, torque: StateSpace::gain(command) }
+    }
+}
+
+/// A sensor as drawn.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DrawnSensor {
+    /// Scale factor, −.
+    pub scale: f64,
+    /// Gain on the slope of each mode at its grid, −.
+    pub slope_gain: Vec<f64>,
+}
+
+/// A path of the autopilot as drawn.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DrawnPath {
+    /// Gain, −.
+    pub gain: f64,
+    /// What the draw makes of each filter.
+    pub filters: Vec<FilterDraw>,
+}
+
+/// The autopilot as drawn; empty for a vehicle without one.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DrawnAutopilot {
+    /// Loop delay, s.
+    pub delay_s: f64,
+    /// Sensors, in the order of the vehicle.
+    pub sensors: Vec<DrawnSensor>,
+    /// Paths, in the order of the vehicle.
+    pub paths: Vec<DrawnPath>,
+}
 
 /// An engine as drawn, ablation and gains applied.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -21,10 +70,8 @@ pub struct DrawnEngine {
     pub axial_inertia_kg_m2: f64,
     /// Nozzle length L_n, m.
     pub length_m: f64,
-    /// Stiffness on each gimbal rotation: actuator and, where separate, flex bearing, N·m/rad.
-    pub gimbal_stiffness_n_m_rad: [f64; 2],
-    /// Damping on each gimbal rotation, N·m·s/rad.
-    pub gimbal_damping_n_m_s_rad: [f64; 2],
+    /// Actuators of each set, one per gimbal axis, as in `Engine::sets`.
+    pub actuators: Vec<[DrawnActuator; 2]>,
     /// Gain on the gimbal shape Φ_g per mode, −.
     pub shape_gain: Vec<f64>,
     /// Gain on the gimbal slope Ψ_g per mode, −.
@@ -97,6 +144,8 @@ pub struct DrawnVehicle {
     pub body: DrawnBody,
     /// Every engine of the vehicle, in its order.
     pub engines: Vec<DrawnEngine>,
+    /// The autopilot.
+    pub autopilot: DrawnAutopilot,
     /// Every tank of the vehicle, in its order.
     pub tanks: Vec<DrawnTank>,
     /// Aerodynamics at this flight time, if the vehicle has them.

@@ -26,6 +26,8 @@ pub struct Attachment {
     pub case_per_flow: Vec<f64>,
     /// Whether the modes already contain the engine's mass (integrated body).
     pub in_modes: bool,
+    /// Number of the pair of actuators that moves it, as in `Engine::sets`.
+    pub actuators: usize,
 }
 
 impl Attachment {

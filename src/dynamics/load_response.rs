@@ -3,7 +3,58 @@
 //!
 //! It works on any dynamic stiffness; actuator models come from elsewhere.
 
+use crate::vehicle::{Actuator, Bearing, Engine, StateSpace};
 use nalgebra::Complex;
+
+/// A nozzle on one of its actuators and the flex bearing, in the plane of one gimbal axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NozzleOnActuator {
+    inertia_kg_m2: f64,
+    bearing_stiffness_n_m_rad: f64,
+    bearing_damping_n_m_s_rad: f64,
+    torque: StateSpace,
+}
+
+impl NozzleOnActuator {
+    /// A nozzle of inertia `inertia_kg_m2` about its pivot on `actuator`, with the bearing of `engine`.
+    pub fn new(engine: &Engine, actuator: &Actuator, inertia_kg_m2: f64) -> Self {
+        let separate = actuator.bearing == Bearing::Separate;
+        Self {
+            inertia_kg_m2,
+            bearing_stiffness_n_m_rad: if separate {
+                engine.bearing_stiffness_n_m_rad
+            } else {
+                0.0
+            },
+            bearing_damping_n_m_s_rad: engine.bearing_damping_n_m_s_rad,
+            torque: actuator.law.state_space(),
+        }
+    }
+
+    /// Torque per command, N·m/rad, and dynamic stiffness τ/Θ of nozzle, bearing and actuator, N·m/rad, at
+    /// the complex frequency s, rad/s; the latter is infinite at a pole of the actuator.
+    fn at(&self, s: Complex<f64>) -> [Complex<f64>; 2] {
+        let Some(torque) = self.torque.response(s) else {
+            return [Complex::from(f64::INFINITY); 2];
+        };
+        let held = s * s * self.inertia_kg_m2
+            + s * self.bearing_damping_n_m_s_rad
+            + self.bearing_stiffness_n_m_rad;
+        [torque[(0, 0)], held - torque[(0, 1)] - torque[(0, 2)] * s]
+    }
+
+    /// Response to a load torque, the command held.
+    pub fn load_response(&self) -> LoadResponse {
+        LoadResponse::of(self.inertia_kg_m2, |s| self.at(s)[1])
+    }
+
+    /// Compliance Θ/τ to a load torque, rad/(N·m), and response Θ/δ_c to a command at the frequency
+    /// `omega_rad_s`.
+    pub fn response(&self, omega_rad_s: f64) -> [Complex<f64>; 2] {
+        let [drive, stiffness] = self.at(Complex::new(0.0, omega_rad_s));
+        [1.0 / stiffness, drive / stiffness]
+    }
+}
 
 /// What a nozzle on its actuator does under an external load torque, the command held.
 #[derive(Debug, Clone, Copy, PartialEq)]

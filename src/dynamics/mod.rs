@@ -20,20 +20,28 @@
 pub mod aerodynamics;
 pub mod assemble;
 pub mod attached;
+pub mod control_law;
 pub mod drawn;
 pub mod engine;
+pub mod interconnection;
 pub mod jet_damping;
 pub mod layout;
 pub mod load_response;
 pub mod model;
 pub mod planar;
 pub mod rigid_body;
+pub mod servo;
 pub mod slosh;
 pub mod virtual_grid;
 
 pub use assemble::{Effects, NozzleJet, Plant};
-pub use drawn::{DrawnAerodynamics, DrawnBody, DrawnEngine, DrawnTank, DrawnVehicle};
+pub use control_law::ControlLaw;
+pub use drawn::{
+    DrawnActuator, DrawnAerodynamics, DrawnAutopilot, DrawnBody, DrawnEngine, DrawnPath,
+    DrawnSensor, DrawnTank, DrawnVehicle,
+};
 pub use engine::Attachment;
 pub use layout::{Layout, Part};
 pub use model::{Model, NullMotion};
+pub use servo::{Feedback, Servo};
 pub use slosh::TankAttachment;

@@ -2,18 +2,29 @@
 //!
 //! It is computed in `dynamics::load_response`.
 
-use crate::dynamics::load_response::LoadResponse;
-use crate::vehicle::Engine;
+use crate::dynamics::load_response::NozzleOnActuator;
+use crate::vehicle::{Engine, Law};
 use comfy_table::{CellAlignment, Table, presets};
 use std::f64::consts::TAU;
 
-/// A row per actuator and nozzle state: unablated, and ablated as after full burn with the nominal
-/// factor.
+/// Nozzle states of an engine by name, with their inertias about the pivot, kg·m²: unablated, and ablated
+/// as after full burn with the nominal factor.
+pub fn nozzle_states(engine: &Engine) -> Vec<(&'static str, f64)> {
+    let mut states = vec![("unablated", engine.nozzle.inertia_kg_m2)];
+    if let Some(ablation) = engine.nozzle.ablation {
+        states.push(("ablated", engine.nozzle.ablated(ablation.factor).inertia_kg_m2));
+    }
+    states
+}
+
+/// A row per actuator of every set and nozzle state.
 pub fn table<'a>(engines: impl Iterator<Item = &'a Engine>) -> Table {
     let mut table = Table::new();
     table.load_style(presets::UTF8_HORIZONTAL_ONLY);
     table.set_header([
         "actuator",
+        "set",
+        "kind",
         "nozzle",
         "inertia\nkg·m²",
         "static\ncompliance\nrad/(MN·m)",
@@ -23,19 +34,21 @@ pub fn table<'a>(engines: impl Iterator<Item = &'a Engine>) -> Table {
         "equivalent\ndamping\nkN·m·s/rad",
     ]);
     for engine in engines {
-        let mut states = vec![("unablated", engine.nozzle)];
-        if let Some(ablation) = engine.nozzle.ablation {
-            states.push(("ablated", engine.nozzle.ablated(ablation.factor)));
-        }
-        for (axis, actuator) in engine.actuators.iter().enumerate() {
-            let (stiffness, damping) = engine.gimbal_stiffness_and_damping(axis);
-            for (state, nozzle) in &states {
-                let inertia = nozzle.inertia_kg_m2;
-                let response =
-                    LoadResponse::of(inertia, |s| s * s * inertia + s * damping + stiffness);
+        let actuators = engine.sets().flat_map(|(set, pair)| pair.iter().map(move |a| (set, a)));
+        for (set, actuator) in actuators {
+            let kind = match actuator.law {
+                Law::SecondOrder(_) => "second-order",
+                Law::Electrohydraulic(_) => "electrohydraulic",
+                Law::TransferFunction(_) => "transfer-function",
+                Law::StateSpace(_) => "state-space",
+            };
+            for (state, inertia) in nozzle_states(engine) {
+                let response = NozzleOnActuator::new(engine, actuator, inertia).load_response();
                 let mut row = vec![
                     format!("{}.{}", engine.path(), actuator.name),
-                    (*state).to_string(),
+                    set.unwrap_or("").to_owned(),
+                    kind.to_owned(),
+                    state.to_owned(),
                     format!("{inertia:.0}"),
                     format!("{:.6}", response.static_compliance_rad_n_m * 1e6),
                 ];
@@ -52,7 +65,7 @@ pub fn table<'a>(engines: impl Iterator<Item = &'a Engine>) -> Table {
             }
         }
     }
-    for column in table.column_iter_mut().skip(2) {
+    for column in table.column_iter_mut().skip(4) {
         column.set_cell_alignment(CellAlignment::Right);
     }
     table

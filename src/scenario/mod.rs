@@ -1,6 +1,9 @@
 //! Scenario: from the text of the input files to validated values, with all problems at once.
 
+pub mod actuator;
 pub mod aerodynamics;
+pub mod autopilot;
+pub mod autopilot_file;
 pub mod dispersion;
 #[cfg(test)]
 mod fixture;

@@ -1,8 +1,10 @@
-//! Names and lists of a file: words, unique names, ascending numbers.
+//! Names and lists of a file: words, unique names, known grids, ascending numbers.
 //!
 //! What is named is known to the callers.
 
 use super::table::Findings;
+use crate::spelling::allowed_instead;
+use crate::vehicle::ModeSet;
 
 /// Whether `text` is one or more of `a`–`z`, `0`–`9` and `_`: fit for a column name and a
 /// parameter path.
@@ -29,6 +31,19 @@ pub fn unique<'a>(findings: &mut Findings, list: &str, names: impl Iterator<Item
         }
         seen.push(name);
     }
+}
+
+/// Finds a grid that does not exist at every flight time; `None` where it does not or no set is known.
+pub fn grid(findings: &mut Findings, key: &str, name: &str, sets: &[&ModeSet]) -> Option<()> {
+    let missing: Vec<&&ModeSet> = sets.iter().filter(|s| s.grid(name).is_none()).collect();
+    if let Some(first) = missing.first() {
+        let times: Vec<String> = missing.iter().map(|s| s.flight_time_s.to_string()).collect();
+        let found = format!("grid \"{name}\", missing at {} s", times.join(", "));
+        let known = first.grids.iter().map(|g| g.name.as_str());
+        findings.push(key, found, allowed_instead(name, known));
+        return None;
+    }
+    (!sets.is_empty()).then_some(())
 }
 
 /// Finds a number that is not above the one before; whether there is none.

@@ -2,10 +2,13 @@
 //!
 //! Types and ranges of single values are checked before, by `table`.
 
-use super::run_file::{CornerFile, NozzleJetFile, RunFile, SignsFile, SlopeFile, VariantFile};
+use super::run_file::{
+    CornerFile, FeedbackFile, NozzleJetFile, RunFile, SignsFile, SlopeFile, VariantFile,
+};
 use super::table::Findings;
 use super::vehicle::Resolved;
 use super::{names, pattern};
+use crate::campaign::definition::Feedback;
 use crate::campaign::{Definition, NozzleJet, Population, Slope, Variant};
 use crate::dispersion::Dispersion;
 use crate::problem::Problems;
@@ -69,6 +72,7 @@ pub fn resolve(
     let flight_times_s = flight_times(file, vehicle, f);
     modes(file, vehicle, &flight_times_s, f);
     let gimballed = gimballed(file, vehicle, f);
+    servo(&variants, vehicle, &gimballed, f);
 
     let standard = |name: &str, cases, drawn| Population {
         name: name.into(),
@@ -141,6 +145,12 @@ fn variant(file: &VariantFile) -> Variant {
         rigid_body: file.rigid_body,
         slosh: file.slosh,
         aerodynamics: file.aerodynamics,
+        feedback: match file.feedback {
+            FeedbackFile::Open => Feedback::Open,
+            FeedbackFile::Closed => Feedback::Closed,
+            FeedbackFile::Inverted => Feedback::Inverted,
+        },
+        actuators: file.actuators.clone(),
     }
 }
 
@@ -195,6 +205,33 @@ fn gimballed(file: &RunFile, vehicle: Option<&Resolved>, f: &mut Findings) -> Ve
     }
     let chosen = |path: &String| file.gimballed.iter().any(|entry| pattern::matches(entry, path));
     paths.iter().map(chosen).collect()
+}
+
+/// Variants name sets of actuators that exist, and close loops that the vehicle has.
+fn servo(variants: &[Variant], vehicle: Option<&Resolved>, gimballed: &[bool], f: &mut Findings) {
+    let Some(vehicle) = vehicle.map(|v| &v.vehicle) else { return };
+    let sets = vehicle.actuator_sets();
+    for (i, variant) in variants.iter().enumerate() {
+        if let Some(set) = variant.actuators.as_deref().filter(|set| !sets.contains(set)) {
+            let allowed = allowed_instead(set, sets.iter().copied());
+            f.push(format!("variant[{i}].actuators"), format!("\"{set}\""), allowed);
+        }
+        if variant.feedback == Feedback::Open {
+            continue;
+        }
+        let key = format!("variant[{i}].feedback");
+        let Some(autopilot) = &vehicle.autopilot else {
+            f.push(key, "a closed loop on a vehicle without an autopilot", "open");
+            continue;
+        };
+        let mut gimbals = autopilot.allocation.gimbals.iter();
+        if let Some((engine, _)) = gimbals.find(|(engine, _)| !gimballed[*engine]) {
+            let path = vehicle.engines[*engine].path();
+            let found = format!("a loop through the locked engine \"{path}\"");
+            let allowed = "open, or a run that gimbals every engine of the allocation";
+            f.push(key, found, allowed);
+        }
+    }
 }
 
 /// Fixed values of a corner whose signs the file gives, in the order of the draw keys.

@@ -91,10 +91,29 @@ pub struct VariantFile {
     /// Aerodynamic forces of the vehicle file.
     #[serde(default)]
     pub aerodynamics: bool,
+    /// What the autopilot does.
+    #[serde(default)]
+    pub feedback: FeedbackFile,
+    /// Alternative set of actuators; engines without it keep their own.
+    pub actuators: Option<String>,
 }
 
 fn yes() -> bool {
     true
+}
+
+/// What the autopilot does.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(inline)]
+pub enum FeedbackFile {
+    /// Nothing: servo loops closed, autopilot off.
+    #[default]
+    Open,
+    /// It acts.
+    Closed,
+    /// It acts with the sign of every axis loop changed.
+    Inverted,
 }
 
 /// Jet damping of the nozzle.

@@ -4,14 +4,13 @@
 
 use super::gimbal::{self, Refusal};
 use super::table::Findings;
-use super::vehicle_file::{ActuatorFile, BearingPart, EngineFile, MotorFile, VehicleFile};
-use super::{aerodynamics, names, pattern, tank};
+use super::vehicle_file::{EngineFile, MotorFile, VehicleFile};
+use super::{actuator, aerodynamics, autopilot, names, pattern, tank};
 use crate::dynamics::virtual_grid::Geometry;
 use crate::problem::Problems;
 use crate::spelling::allowed_instead;
 use crate::vehicle::{
-    Ablation, Actuator, Bearing, Engine, Modal, ModeSet, Motor, NamedMode, Nozzle, SecondOrder,
-    Vehicle,
+    Ablation, Actuator, ActuatorSet, Engine, Modal, ModeSet, Motor, NamedMode, Nozzle, Vehicle,
 };
 use nalgebra::{Matrix3x2, Vector3};
 use std::sync::Arc;
@@ -46,21 +45,39 @@ pub fn resolve(
     let parts = resolver.resolve(modal.as_ref());
     let tanks = tank::resolve(file, &resolver.sets, modal.as_ref(), resolver.findings);
     let aerodynamics = aerodynamics::resolve(file, modal.as_ref(), resolver.findings);
-    let parts = parts.zip(tanks).zip(aerodynamics).zip(modal);
-    let resolved = parts.map(|((((engines, named_modes), tanks), aerodynamics), modal)| Resolved {
-        vehicle: Vehicle {
-            name: file.name.clone(),
-            structural_damping: file.structure.damping_ratio,
-            band_time_s: file.structure.band_time_s,
-            named_modes,
-            engines,
-            tanks,
-            aerodynamics,
-            modal,
-        },
-        flight_times_s: file.flight_times_s.clone(),
-    });
+    let engines = parts.as_ref().map(|(engines, _)| engines.as_slice());
+    let body = engines.zip(tanks.as_deref());
+    let autopilot = (file.autopilot.as_ref())
+        .map(|file| autopilot::resolve(file, body, &resolver.sets, resolver.findings));
+    // One that is there but wrong leaves no vehicle.
+    let autopilot = autopilot.map_or(Some(None), |autopilot| autopilot.map(Some));
+    let parts = parts.zip(tanks).zip(aerodynamics).zip(autopilot).zip(modal);
+    let resolved =
+        parts.map(|(((((engines, named_modes), tanks), aerodynamics), autopilot), modal)| {
+            Resolved {
+                vehicle: Vehicle {
+                    name: file.name.clone(),
+                    structural_damping: file.structure.damping_ratio,
+                    band_time_s: file.structure.band_time_s,
+                    named_modes,
+                    engines,
+                    tanks,
+                    aerodynamics,
+                    autopilot,
+                    modal,
+                },
+                flight_times_s: file.flight_times_s.clone(),
+            }
+        });
     findings.finish(resolved)
+}
+
+/// Where an actuator is attached, see [`Actuator`].
+#[derive(Clone)]
+struct Place {
+    attach_grid: String,
+    attach_m: Vector3<f64>,
+    action_line: Vector3<f64>,
 }
 
 struct Resolver<'a> {
@@ -92,7 +109,8 @@ impl<'a> Resolver<'a> {
             self.engines_in_modes(&paths, &modal.contains_engines);
         }
         let named_modes = self.named_modes(modal);
-        Some((engines.into_iter().collect::<Option<_>>()?, named_modes))
+        let engines: Option<Vec<Engine>> = engines.into_iter().collect();
+        Some((engines?, named_modes))
     }
 
     fn flight_times(&mut self, modal: Option<&'a Modal>) {
@@ -218,15 +236,12 @@ impl<'a> Resolver<'a> {
         let gimbal = self.grid(&format!("{key}.gimbal_grid"), &file.gimbal_grid);
         let thrust =
             self.accept(&format!("{key}.thrust_direction"), gimbal::unit(file.thrust_direction));
-        let actuators = [0, 1].map(|a| self.actuator(&key, file, a));
-        let actuator_names = file.actuator.iter().map(|a| a.name.as_str());
-        names::unique(self.findings, &format!("{key}.actuator"), actuator_names);
+        let actuators = self.actuators(&key, file, thrust.as_ref());
         let case_stations = match (gimbal, thrust) {
             (Some(()), Some(thrust)) => self.case_stations(&key, file, &thrust),
             _ => None,
         };
-        let [first, second] = actuators;
-        let (actuators, thrust_direction) = ([first?, second?], thrust?);
+        let ((actuators, alternatives), thrust_direction) = (actuators?, thrust?);
         let axes = self.axes(&key, file, &actuators, &thrust_direction);
         let path = format!("{}.{}", file.group, file.name);
         let bearing = file.bearing.as_ref();
@@ -242,6 +257,7 @@ impl<'a> Resolver<'a> {
             bearing_stiffness_n_m_rad: bearing.map_or(0.0, |b| b.stiffness_n_m_rad),
             bearing_damping_n_m_s_rad: bearing.map_or(0.0, |b| b.damping_n_m_s_rad),
             actuators,
+            alternatives,
             case_stations: case_stations?,
         })
     }
@@ -292,92 +308,127 @@ impl<'a> Resolver<'a> {
 
     /// Checks that a grid exists at every flight time; `None` where it does not or is unknown.
     fn grid(&mut self, key: &str, name: &str) -> Option<()> {
-        let missing: Vec<&&ModeSet> = self.sets.iter().filter(|s| s.grid(name).is_none()).collect();
-        if let Some(first) = missing.first() {
-            let times: Vec<String> = missing.iter().map(|s| s.flight_time_s.to_string()).collect();
-            let found = format!("grid \"{name}\", missing at {} s", times.join(", "));
-            let known = first.grids.iter().map(|g| g.name.as_str());
-            self.findings.push(key, found, allowed_instead(name, known));
-            return None;
-        }
-        (!self.sets.is_empty()).then_some(())
+        names::grid(self.findings, key, name, &self.sets)
     }
 
     fn position(&self, set: &ModeSet, grid: &str) -> Option<Vector3<f64>> {
         set.grid(grid).map(|index| set.grids[index].position_m)
     }
 
-    fn actuator(&mut self, engine_key: &str, engine: &EngineFile, a: usize) -> Option<Actuator> {
-        let file = &engine.actuator[a];
-        let key = format!("{engine_key}.actuator[{a}]");
-        names::word(self.findings, &format!("{key}.name"), &file.name);
-        let line = gimbal::unit(file.action_line);
-        let action_line = self.accept(&format!("{key}.action_line"), line);
-        let attached = self.grid(&format!("{key}.attach_grid"), &file.attach_grid);
-        let attach_m = match file.attach_m {
-            Some(point) => Some(Vector3::from(point)),
-            None => attached.and_then(|()| self.attach_point(&key, engine, file)),
-        };
-        let inertia = engine.nozzle.inertia_kg_m2;
-        let stiffness = match (file.stiffness_n_m_rad, file.frequency_hz) {
-            (Some(stiffness), None) => Some(stiffness),
-            (None, Some(hertz)) => Some(inertia * (hertz * std::f64::consts::TAU).powi(2)),
-            (given, _) => {
-                let found = if given.is_some() { "both" } else { "neither" };
-                let allowed = "exactly one of `stiffness_n_m_rad` and `frequency_hz`";
-                self.findings.push(&key, found, allowed);
-                None
+    /// The engine's own actuators and the alternative sets.
+    fn actuators(
+        &mut self,
+        engine_key: &str,
+        engine: &EngineFile,
+        thrust: Option<&Vector3<f64>>,
+    ) -> Option<([Actuator; 2], Vec<ActuatorSet>)> {
+        let key = format!("{engine_key}.actuator");
+        let files = &engine.actuator;
+        names::unique(self.findings, &key, files.iter().map(|a| a.name.as_str()));
+        let mut sets: Vec<Option<&String>> = vec![None];
+        for set in files.iter().map(|a| a.set.as_ref()) {
+            if !sets.contains(&set) {
+                sets.push(set);
             }
-        };
-        let bearing = match (file.bearing, &engine.bearing) {
-            (BearingPart::Separate, None) => {
-                let allowed = "`[engine.bearing]` with a stiffness, or bearing = \"included\"";
-                self.findings.push(
-                    format!("{key}.bearing"),
-                    "\"separate\" without a bearing",
-                    allowed,
-                );
-                None
-            }
-            (BearingPart::Separate, Some(_)) => Some(Bearing::Separate),
-            (BearingPart::Included, flex) => {
-                let flex = flex.as_ref().map_or(0.0, |b| b.stiffness_n_m_rad);
-                if let Some(stiffness) = stiffness.filter(|k| !(*k >= flex)) {
-                    let found = format!(
-                        "an actuator stiffness of {stiffness} N·m/rad that includes a bearing of {flex} N·m/rad"
-                    );
-                    let allowed = "at least the bearing's stiffness, or bearing = \"separate\"";
-                    self.findings.push(format!("{key}.bearing"), found, allowed);
+        }
+        let mut places: [Option<Place>; 2] = [None, None];
+        let mut pairs = Vec::new();
+        for set in sets {
+            let of_set = |a: &usize| files[*a].set.as_ref() == set;
+            let members: Vec<usize> = (0..files.len()).filter(of_set).collect();
+            let &[first, second] = members.as_slice() else {
+                let whose = set.map_or("without a `set`".into(), |set| format!("of set \"{set}\""));
+                let found = format!("{} actuators {whose}", members.len());
+                self.findings.push(&key, found, "two, one for each gimbal axis");
+                return None;
+            };
+            match set {
+                None => {
+                    places = [first, second].map(|a| self.place(&format!("{key}[{a}]"), engine, a))
                 }
-                Some(Bearing::Included)
+                Some(set) => {
+                    names::word(self.findings, &format!("{key}[{first}].set"), set);
+                    self.no_place(&key, engine, [first, second]);
+                }
             }
+            let [first, second] = [(0, first), (1, second)].map(|(axis, a)| {
+                self.actuator(&format!("{key}[{a}]"), engine, a, places[axis].as_ref(), thrust)
+            });
+            pairs.push((set, first.zip(second)));
+        }
+        let mut pairs = pairs.into_iter();
+        let own: [Actuator; 2] = pairs.next()?.1?.into();
+        let set = |(name, pair): (Option<&String>, Option<(Actuator, Actuator)>)| {
+            Some(ActuatorSet { name: name?.clone(), actuators: pair?.into() })
         };
-        Some(Actuator {
-            name: file.name.clone(),
-            attach_grid: file.attach_grid.clone(),
-            attach_m: attach_m?,
-            action_line: action_line?,
-            bearing: bearing?,
-            law: SecondOrder {
-                stiffness_n_m_rad: stiffness?,
-                damping_ratio: file.damping_ratio,
-                reference_inertia_kg_m2: inertia,
-            },
-        })
+        Some((own, pairs.map(set).collect::<Option<_>>()?))
     }
 
-    /// The attach point from the gimbal, by the grids' positions, the same at every flight time.
-    fn attach_point(
+    /// An alternative actuator says nothing about its place.
+    fn no_place(&mut self, key: &str, engine: &EngineFile, members: [usize; 2]) {
+        for a in members {
+            let file = &engine.actuator[a];
+            for (name, given) in [
+                ("attach_grid", file.attach_grid.is_some()),
+                ("attach_m", file.attach_m.is_some()),
+                ("action_line", file.action_line.is_some()),
+            ] {
+                if given {
+                    let allowed =
+                        "nothing: a set stands in the place of the engine's own actuators";
+                    self.findings.push(format!("{key}[{a}].{name}"), "a value", allowed);
+                }
+            }
+        }
+    }
+
+    fn actuator(
         &mut self,
         key: &str,
         engine: &EngineFile,
-        file: &ActuatorFile,
-    ) -> Option<Vector3<f64>> {
+        a: usize,
+        place: Option<&Place>,
+        thrust: Option<&Vector3<f64>>,
+    ) -> Option<Actuator> {
+        let file = &engine.actuator[a];
+        names::word(self.findings, &format!("{key}.name"), &file.name);
+        let arm = place.zip(thrust).map(|(place, thrust)| {
+            let moment = place.attach_m.cross(&place.action_line);
+            (moment - thrust * thrust.dot(&moment)).norm()
+        });
+        let (bearing, law) = actuator::drive(key, file, engine, arm, self.findings)?;
+        let Place { attach_grid, attach_m, action_line } = place?.clone();
+        Some(Actuator { name: file.name.clone(), attach_grid, attach_m, action_line, bearing, law })
+    }
+
+    /// Where an engine's own actuator is attached.
+    fn place(&mut self, key: &str, engine: &EngineFile, a: usize) -> Option<Place> {
+        let file = &engine.actuator[a];
+        let mut given = |name: &str, given: bool, allowed: &str| {
+            if !given {
+                self.findings.push(format!("{key}.{name}"), "nothing", allowed);
+            }
+        };
+        given("attach_grid", file.attach_grid.is_some(), "a text");
+        given("action_line", file.action_line.is_some(), "a list of 3, each a finite number");
+        let line = file.action_line.map(gimbal::unit);
+        let action_line = line.and_then(|line| self.accept(&format!("{key}.action_line"), line));
+        let grid = file.attach_grid.as_ref();
+        let attached = grid.and_then(|grid| self.grid(&format!("{key}.attach_grid"), grid));
+        let attach_m = match file.attach_m {
+            Some(point) => Some(Vector3::from(point)),
+            None => attached.and_then(|()| self.attach_point(key, engine, grid?)),
+        };
+        Some(Place { attach_grid: grid?.clone(), attach_m: attach_m?, action_line: action_line? })
+    }
+
+    /// The attach point from the gimbal, by the grids' positions, the same at every flight time.
+    fn attach_point(&mut self, key: &str, engine: &EngineFile, grid: &str) -> Option<Vector3<f64>> {
         let arms: Vec<Vector3<f64>> = self
             .sets
             .iter()
             .map(|set| {
-                let attach = self.position(set, &file.attach_grid)?;
+                let attach = self.position(set, grid)?;
                 Some(attach - self.position(set, &engine.gimbal_grid)?)
             })
             .collect::<Option<_>>()?;

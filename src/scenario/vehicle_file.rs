@@ -2,6 +2,7 @@
 //!
 //! Types and ranges of single values live here; the rest is checked in `vehicle`.
 
+use super::autopilot_file::AutopilotFile;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -34,6 +35,8 @@ pub struct VehicleFile {
     pub tank: Vec<TankFile>,
     /// Aerodynamics along the trajectory.
     pub aerodynamics: Option<AerodynamicsFile>,
+    /// Autopilot.
+    pub autopilot: Option<AutopilotFile>,
 }
 
 /// A tank: its slosh mass on a spring, given directly or from its geometry and fill.
@@ -198,8 +201,9 @@ pub struct EngineFile {
     pub nozzle: NozzleFile,
     /// Flex bearing.
     pub bearing: Option<BearingFile>,
-    /// The two actuators.
-    pub actuator: [ActuatorFile; 2],
+    /// The two actuators, one for each axis, and two more for each alternative `set`.
+    #[schemars(length(min = 2))]
+    pub actuator: Vec<ActuatorFile>,
 }
 
 /// The moving part of an engine, rotationally symmetric about its axis.
@@ -265,44 +269,145 @@ pub struct BearingFile {
 pub struct ActuatorFile {
     /// Name inside its engine, the third segment of its parameter paths.
     pub name: String,
-    /// Grid of the backup structure to which it is attached.
-    pub attach_grid: String,
+    /// Alternative set of which it is a part: a variant picks it by this name. Its two actuators stand
+    /// in the place of the engine's own, in the order of the axes. Left out: the engine's own.
+    pub set: Option<String>,
+    /// Grid of the backup structure to which it is attached; for the engine's own actuators only.
+    pub attach_grid: Option<String>,
     /// Attach point from the gimbal, m (default: from the positions of the two grids).
     pub attach_m: Option<[f64; 3]>,
-    /// Unit vector of the action line.
-    pub action_line: [f64; 3],
+    /// Unit vector of the action line; for the engine's own actuators only.
+    pub action_line: Option<[f64; 3]>,
     /// Torque law.
     pub kind: ActuatorKind,
-    /// Stiffness at the reference inertia, N·m/rad; either this or `frequency_hz`.
+    /// Second-order: stiffness at the reference inertia, N·m/rad; either this or `frequency_hz`.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub stiffness_n_m_rad: Option<f64>,
-    /// Natural frequency at the reference inertia, Hz; either this or `stiffness_n_m_rad`.
+    /// Second-order: natural frequency at the reference inertia, Hz; either this or
+    /// `stiffness_n_m_rad`.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub frequency_hz: Option<f64>,
-    /// Closed-loop damping ratio at the reference inertia, the nominal unablated one about the
-    /// pivot.
+    /// Second-order: closed-loop damping ratio at the reference inertia, the nominal unablated one about
+    /// the pivot.
     #[schemars(range(min = 0.0))]
-    pub damping_ratio: f64,
-    /// Whether the flex bearing is part of the actuator's stiffness.
-    #[serde(default)]
-    pub bearing: BearingPart,
+    pub damping_ratio: Option<f64>,
+    /// Numbers of an electrohydraulic actuator.
+    pub electrohydraulic: Option<ElectrohydraulicFile>,
+    /// Numbers of an actuator given by transfer functions.
+    pub transfer_function: Option<TransferFunctionFile>,
+    /// Matrices of an actuator in state space.
+    pub state_space: Option<StateSpaceFile>,
+    /// Whether the flex bearing is part of the actuator's stiffness (default: included for
+    /// second-order, separate for electrohydraulic).
+    pub bearing: Option<BearingPart>,
 }
 
 /// Torque law of an actuator.
-#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub enum ActuatorKind {
     /// Spring and damper between command and nozzle.
     SecondOrder,
+    /// Servo valve, cylinder and load path, with a position loop.
+    Electrohydraulic,
+    /// Torque by transfer functions from command and rotation.
+    TransferFunction,
+    /// Torque by matrices from command, rotation and its rate.
+    StateSpace,
+}
+
+impl ActuatorKind {
+    /// Its word in a vehicle file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SecondOrder => "second-order",
+            Self::Electrohydraulic => "electrohydraulic",
+            Self::TransferFunction => "transfer-function",
+            Self::StateSpace => "state-space",
+        }
+    }
+}
+
+/// An electrohydraulic actuator with a massless piston.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ElectrohydraulicFile {
+    /// Moment arm about the pivot, m (default: from attach point and action line).
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub arm_m: Option<f64>,
+    /// Piston area, m².
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub piston_area_m2: f64,
+    /// Stiffness of the load path: both attachments and the rod, N/m.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub load_path_stiffness_n_m: f64,
+    /// Stiffness of the trapped oil on the piston, N/m.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub oil_stiffness_n_m: f64,
+    /// Leakage past the piston, m³/(s·Pa).
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub leakage_m3_s_pa: f64,
+    /// Flow gain of the servo valve without load, m³/(s·A).
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub valve_flow_gain_m3_s_a: f64,
+    /// Pressure gain of the servo valve with the load blocked, Pa/A (default: infinite).
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub valve_pressure_gain_pa_a: Option<f64>,
+    /// Gain of the position loop: current per piston position error, A/m.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub position_gain_a_m: f64,
+    /// Gain of the dynamic pressure feedback, A/Pa.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub pressure_feedback_a_pa: f64,
+    /// Corner of the high pass in the pressure feedback, Hz; 0: the pressure itself is fed back.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub pressure_corner_hz: f64,
+}
+
+/// Torque = G(s) δ_c − Z(s) Θ − C Θ̇, N·m.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TransferFunctionFile {
+    /// Numerator of the dynamic stiffness Z, N·m/rad, falling powers of s.
+    #[schemars(length(min = 1))]
+    pub numerator: Vec<f64>,
+    /// Denominator of Z.
+    #[schemars(length(min = 1))]
+    pub denominator: Vec<f64>,
+    /// Numerator of the torque per command G, N·m/rad (default: G = Z).
+    #[schemars(length(min = 1))]
+    pub command_numerator: Option<Vec<f64>>,
+    /// Denominator of G.
+    #[schemars(length(min = 1))]
+    pub command_denominator: Option<Vec<f64>>,
+    /// Damping C, N·m·s/rad.
+    #[serde(default)]
+    pub damping_n_m_s_rad: f64,
+}
+
+/// ẋ = a x + b [δ_c, Θ, Θ̇], torque = c x + d [δ_c, Θ, Θ̇], N·m.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StateSpaceFile {
+    /// a, n rows of n; empty without states.
+    pub a: Vec<Vec<f64>>,
+    /// b, n rows for [δ_c, Θ, Θ̇].
+    pub b: Vec<[f64; 3]>,
+    /// c, n entries.
+    pub c: Vec<f64>,
+    /// d, for [δ_c, Θ, Θ̇].
+    pub d: [f64; 3],
 }
 
 /// Whether the flex bearing is part of an actuator's stiffness.
-#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 #[schemars(inline)]
 pub enum BearingPart {
     /// Inside the actuator's stiffness, not added.
-    #[default]
     Included,
     /// Acts on the gimbal rotation besides the actuator.
     Separate,

@@ -1,5 +1,16 @@
-//! An actuator of one gimbal axis, as nominal data.
+//! An actuator of one gimbal axis, as nominal data; one file for each kind of torque law.
 
+mod electrohydraulic;
+mod second_order;
+mod state_space;
+mod transfer_function;
+
+pub use electrohydraulic::Electrohydraulic;
+pub use second_order::SecondOrder;
+pub use state_space::StateSpaceActuator;
+pub use transfer_function::TransferActuator;
+
+use super::StateSpace;
 use nalgebra::Vector3;
 
 /// Whether the flex bearing is part of the actuator's stiffness.
@@ -11,16 +22,34 @@ pub enum Bearing {
     Separate,
 }
 
-/// Second-order actuator, its stiffness and damping held at the reference inertia
-/// (`K_a = J_ref ω_n²`, `C_a = 2ζ√(J_ref K_a)`; paper, after (2)).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SecondOrder {
-    /// Nominal stiffness K_a, N·m/rad.
-    pub stiffness_n_m_rad: f64,
-    /// Closed-loop damping ratio ζ at the reference inertia, −.
-    pub damping_ratio: f64,
-    /// Reference inertia about the pivot J_ref, kg·m².
-    pub reference_inertia_kg_m2: f64,
+/// Torque law: torque τ on the nozzle from the command δ_c, the gimbal rotation Θ and its rate.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Law {
+    /// Spring and damper between command and nozzle.
+    SecondOrder(SecondOrder),
+    /// Servo valve, cylinder and load path.
+    Electrohydraulic(Electrohydraulic),
+    /// Transfer functions.
+    TransferFunction(TransferActuator),
+    /// Matrices.
+    StateSpace(StateSpaceActuator),
+}
+
+impl Law {
+    /// Torque τ, N·m, from [δ_c, Θ, Θ̇] (rad, rad, rad/s).
+    pub fn state_space(&self) -> StateSpace {
+        match self {
+            Self::SecondOrder(law) => law.state_space(),
+            Self::Electrohydraulic(law) => law.state_space(),
+            Self::TransferFunction(law) => law.state_space(),
+            Self::StateSpace(law) => law.state_space(),
+        }
+    }
+
+    /// Number of states; the same for every draw.
+    pub fn order(&self) -> usize {
+        self.state_space().order()
+    }
 }
 
 /// One actuator; it drives one gimbal axis of its engine.
@@ -37,5 +66,17 @@ pub struct Actuator {
     /// Whether the flex bearing is part of the stiffness.
     pub bearing: Bearing,
     /// Torque law.
-    pub law: SecondOrder,
+    pub law: Law,
 }
+
+/// An alternative pair of actuators of an engine, in the place of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActuatorSet {
+    /// Name by which a variant picks it.
+    pub name: String,
+    /// One per gimbal axis, in the order of the axes.
+    pub actuators: [Actuator; 2],
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,6 @@
 //! An engine: a vectored nozzle on a gimbal, with its actuators and its flow path.
 
-use super::{Actuator, Bearing, Motor};
+use super::{Actuator, ActuatorSet, Motor};
 use nalgebra::{Matrix3x2, Vector3};
 use std::sync::Arc;
 
@@ -76,6 +76,8 @@ pub struct Engine {
     pub bearing_damping_n_m_s_rad: f64,
     /// Actuators, one per gimbal axis, in the order of `axes`.
     pub actuators: [Actuator; 2],
+    /// Alternative actuators in their place.
+    pub alternatives: Vec<ActuatorSet>,
     /// Case centreline grids from the head end to the throat; empty for an engine without a case.
     pub case_stations: Vec<String>,
     /// Whether the modes already contain this engine's mass (integrated body).
@@ -88,20 +90,23 @@ impl Engine {
         format!("{}.{}", self.group, self.name)
     }
 
-    /// Nominal stiffness, N·m/rad, and damping, N·m·s/rad, on the gimbal rotation `axis`: the
-    /// actuator's `K_a` and `C_a = 2ζ√(J_ref K_a)`, and the flex bearing, its stiffness only where
-    /// the actuator does not include it.
-    pub fn gimbal_stiffness_and_damping(&self, axis: usize) -> (f64, f64) {
-        let actuator = &self.actuators[axis];
-        let law = &actuator.law;
-        let separate = match actuator.bearing {
-            Bearing::Included => 0.0,
-            Bearing::Separate => self.bearing_stiffness_n_m_rad,
-        };
-        let critical = (law.reference_inertia_kg_m2 * law.stiffness_n_m_rad).sqrt();
-        (
-            law.stiffness_n_m_rad + separate,
-            2.0 * law.damping_ratio * critical + self.bearing_damping_n_m_s_rad,
-        )
+    /// Pairs of actuators: the engine's own and the alternatives, each with the name of its set.
+    pub fn sets(&self) -> impl Iterator<Item = (Option<&str>, &[Actuator; 2])> {
+        let others = self.alternatives.iter().map(|set| (Some(set.name.as_str()), &set.actuators));
+        std::iter::once((None, &self.actuators)).chain(others)
+    }
+
+    /// Actuator number `index`: those of the pairs of [`Engine::sets`], in order.
+    pub fn actuator(&self, index: usize) -> &Actuator {
+        match index / 2 {
+            0 => &self.actuators[index],
+            set => &self.alternatives[set - 1].actuators[index % 2],
+        }
+    }
+
+    /// Number of the pair of [`Engine::sets`] that stands for the set called `name`: the engine's own
+    /// where it has no such set.
+    pub fn set(&self, name: Option<&str>) -> usize {
+        self.sets().position(|(set, _)| set == name).unwrap_or(0)
     }
 }

@@ -2,17 +2,29 @@
 
 pub mod actuator;
 pub mod aerodynamics;
+pub mod autopilot;
+pub mod delay;
 pub mod engine;
+pub mod filter;
 pub mod motor;
 pub mod package;
+pub mod state_space;
 pub mod tank;
+pub mod transfer_function;
 
-pub use actuator::{Actuator, Bearing, SecondOrder};
+pub use actuator::{
+    Actuator, ActuatorSet, Bearing, Electrohydraulic, Law, SecondOrder, StateSpaceActuator,
+    TransferActuator,
+};
 pub use aerodynamics::Aerodynamics;
+pub use autopilot::{Allocation, Autopilot, Axis, Path, Sensor, SensorKind};
 pub use engine::{Ablation, Engine, Nozzle};
+pub use filter::{Filter, FilterDraw, FilterKind};
 pub use motor::Motor;
 pub use package::{Grid, MassProperties, Modal, Mode, ModeSet, Parent};
+pub use state_space::StateSpace;
 pub use tank::{Slosh, Tank};
+pub use transfer_function::TransferFunction;
 
 use nalgebra::Vector3;
 
@@ -32,6 +44,8 @@ pub struct Vehicle {
     pub named_modes: Vec<NamedMode>,
     /// Engines in file order.
     pub engines: Vec<Engine>,
+    /// Autopilot, if the vehicle has one.
+    pub autopilot: Option<Autopilot>,
     /// Tanks in file order.
     pub tanks: Vec<Tank>,
     /// Aerodynamics, if any.
@@ -41,6 +55,17 @@ pub struct Vehicle {
 }
 
 impl Vehicle {
+    /// Names of the alternative sets of actuators, in file order.
+    pub fn actuator_sets(&self) -> Vec<&str> {
+        let mut sets: Vec<&str> = Vec::new();
+        for set in self.engines.iter().flat_map(|engine| &engine.alternatives) {
+            if !sets.contains(&set.name.as_str()) {
+                sets.push(&set.name);
+            }
+        }
+        sets
+    }
+
     /// Modulus of the nominal mean acceleration at the flight time of `set`, m/s²: `Σ R u` over the
     /// mass of the body and of what its modes do not contain.
     pub fn nominal_acceleration_m_s2(&self, set: &ModeSet) -> f64 {

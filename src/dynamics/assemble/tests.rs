@@ -38,9 +38,11 @@ fn skewed() -> (Plant, DrawnVehicle) {
             slope,
             case_per_flow: Vec::new(),
             in_modes: false,
+            actuators: 0,
         }],
         tanks: Vec::new(),
         aerodynamics: None,
+        servo: None,
     };
     let drawn = DrawnVehicle {
         body: DrawnBody {
@@ -56,13 +58,14 @@ fn skewed() -> (Plant, DrawnVehicle) {
             inertia_kg_m2: 2.2e4,
             axial_inertia_kg_m2: 1.5e4,
             length_m: 4.0,
-            gimbal_stiffness_n_m_rad: [3.7e7, 3.9e7],
-            gimbal_damping_n_m_s_rad: [5.6e5, 5.1e5],
+            actuators: vec![[
+                DrawnActuator::spring(3.7e7, 5.6e5),
+                DrawnActuator::spring(3.9e7, 5.1e5),
+            ]],
             shape_gain: vec![1.0, 1.1, 0.95],
             slope_gain: vec![0.9, 1.0, 1.2],
         }],
-        tanks: Vec::new(),
-        aerodynamics: None,
+        ..DrawnVehicle::default()
     };
     (plant, drawn)
 }
@@ -73,6 +76,7 @@ const NOTHING: Effects = Effects {
     nozzle_jet_damping: NozzleJet::Off,
     follower_thrust: false,
     aerodynamics: 0.0,
+    feedback: 0.0,
 };
 
 fn assembled(plant: &Plant, drawn: &DrawnVehicle, effects: &Effects) -> Model {
@@ -169,7 +173,7 @@ fn the_stiffness_has_thrust_acceleration_and_follower_terms() {
     let mut expected = DMatrix::from_iterator(2, 2, gravity.iter().copied());
     for axis in 0..2 {
         assert!(expected[(axis, axis)] > 0.0, "an engine aft of its pivot is stiffened");
-        expected[(axis, axis)] += engine.gimbal_stiffness_n_m_rad[axis];
+        expected[(axis, axis)] += engine.actuators[0][axis].stiffness_n_m_rad;
     }
     assert_close(&block(&model.stiffness, 3..5, 3..5), &expected);
     assert_eq!(block(&model.stiffness, 3..5, 0..3), DMatrix::zeros(2, 3));
@@ -244,7 +248,7 @@ fn the_planar_pair_is_the_model_of_one_engine_and_one_mode() {
     close(model.damping[(0, 2)], row);
     close(model.damping[(0, 0)], 2.0 * 0.005 * 32.0 + row * psi);
     close(model.damping[(2, 0)], flow * length * length * psi);
-    close(model.damping[(2, 2)], engine.gimbal_damping_n_m_s_rad[1] + flow * length * length);
+    close(model.damping[(2, 2)], engine.actuators[0][1].damping_n_m_s_rad + flow * length * length);
 }
 
 #[test]
@@ -269,7 +273,7 @@ fn a_locked_engine_keeps_its_mass_and_an_integrated_one_adds_none_to_the_modes()
 fn without_thrust_damping_and_flow_every_pole_is_on_the_axis() {
     let (plant, mut drawn) = skewed();
     drawn.body.damping_ratio = vec![0.0; 3];
-    drawn.engines[0].gimbal_damping_n_m_s_rad = [0.0; 2];
+    drawn.engines[0].actuators[0].iter_mut().for_each(|a| a.damping_n_m_s_rad = 0.0);
     let model = assembled(&plant, &drawn, &NOTHING);
     let mut poles = Vec::new();
     crate::modal::Solver::new(5).poles(&model, &mut poles).expect("solved");
@@ -479,7 +483,7 @@ fn the_null_states_are_the_zero_poles_of_the_whole_state_matrix() {
 fn energy_is_conserved_with_rigid_body_and_slosh() {
     let (plant, mut drawn) = free();
     drawn.body.damping_ratio = vec![0.0; 3];
-    drawn.engines[0].gimbal_damping_n_m_s_rad = [0.0; 2];
+    drawn.engines[0].actuators[0].iter_mut().for_each(|a| a.damping_n_m_s_rad = 0.0);
     drawn.tanks[0].damping_ratio = 0.0;
     let model = assembled(&plant, &drawn, &NOTHING);
     let n = model.coordinates();

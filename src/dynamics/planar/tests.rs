@@ -242,9 +242,11 @@ fn the_pair_is_the_three_dimensional_model_of_one_engine_and_one_mode() {
             slope: vec![Vector3::y() * psi],
             case_per_flow: Vec::new(),
             in_modes: false,
+            actuators: 0,
         }],
         tanks: Vec::new(),
         aerodynamics: None,
+        servo: None,
     };
     let drawn = DrawnVehicle {
         body: DrawnBody {
@@ -260,13 +262,11 @@ fn the_pair_is_the_three_dimensional_model_of_one_engine_and_one_mode() {
             inertia_kg_m2: j,
             axial_inertia_kg_m2: 1.5e4,
             length_m: length,
-            gimbal_stiffness_n_m_rad: [k; 2],
-            gimbal_damping_n_m_s_rad: [c; 2],
+            actuators: vec![[DrawnActuator::spring(k, c), DrawnActuator::spring(k, c)]],
             shape_gain: vec![1.0],
             slope_gain: vec![1.0],
         }],
-        tanks: Vec::new(),
-        aerodynamics: None,
+        ..DrawnVehicle::default()
     };
     // The mean acceleration stiffens the gimbal by m g0 r, g0 = R/M.
     let stiffness = k + m * r * thrust / (body_mass + m);
@@ -278,6 +278,7 @@ fn the_pair_is_the_three_dimensional_model_of_one_engine_and_one_mode() {
             nozzle_jet_damping: nozzle_jet,
             follower_thrust: false,
             aerodynamics: 0.0,
+            feedback: 0.0,
         };
         let mut model = Model::zeros(plant.layout.coordinates());
         plant.assemble(&drawn, &effects, &mut model);

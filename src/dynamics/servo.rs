@@ -1,0 +1,496 @@
+//! The servo part of a model: actuators, allocation and autopilot as blocks, connected by name and
+//! written into the model.
+//!
+//! The blocks are prepared once for a vehicle and a way of closing the loop; composing a drawn vehicle
+//! works on numbers alone. Mechanics is added up in `assemble`.
+
+use super::interconnection::{Block, Interconnection, Unknown};
+use super::{ControlLaw, DrawnVehicle, Layout, Model};
+use crate::vehicle::{
+    Autopilot, Axis, FilterDraw, Law, ModeSet, Path, SensorKind, StateSpace, Vehicle, delay,
+};
+use nalgebra::{DMatrix, Vector3};
+
+/// What the autopilot does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Feedback {
+    /// Servo loops closed, autopilot off: filters are no part of the model.
+    #[default]
+    Open,
+    /// Autopilot on: its feedback is subtracted from the commands.
+    Closed,
+    /// The sign of every axis loop changed.
+    Inverted,
+}
+
+/// Why a servo part could not be prepared.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// A loop is to be closed on a vehicle without an autopilot.
+    #[error("the vehicle has no autopilot")]
+    NoAutopilot,
+    /// The autopilot commands an engine that is locked.
+    #[error("the autopilot commands the locked engine `{0}`")]
+    Locked(String),
+    /// No engine has actuators of this set.
+    #[error("no engine has actuators of the set `{0}`")]
+    NoSet(String),
+    /// A sensor's grid is not in the modal package at this time.
+    #[error("autopilot sensor {sensor}: grid `{grid}` is not in the modal package at {time_s} s")]
+    MissingGrid {
+        /// Name of the sensor.
+        sensor: String,
+        /// Name of the grid.
+        grid: String,
+        /// Flight time, s.
+        time_s: f64,
+    },
+    /// A signal that nothing makes.
+    #[error("{0}")]
+    Unknown(#[from] Unknown),
+    /// Paths that pass on at once what they themselves make.
+    #[error("an algebraic loop through {}", .0.join(", "))]
+    AlgebraicLoop(Vec<String>),
+}
+
+/// What a block is made of.
+#[derive(Debug, Clone, PartialEq)]
+enum Source {
+    /// Engine, set, axis.
+    Actuator(usize, usize, usize),
+    /// A matrix that no draw changes.
+    Fixed(StateSpace),
+    /// A path, with the weights of its inputs.
+    Path(usize, DMatrix<f64>),
+    /// Sum of as many paths and loop delay.
+    Axis(usize),
+}
+
+/// A mechanical signal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Signal {
+    /// Rotation of a gimbal: engine, axis.
+    Gimbal(usize, usize),
+    /// Its rate.
+    GimbalRate(usize, usize),
+    /// A sensor about an axis.
+    Sensor(usize, Axis),
+}
+
+/// Actuators, allocation and autopilot of a vehicle, connected.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Servo {
+    connection: Interconnection,
+    sources: Vec<Source>,
+    /// Mechanical signals, the first inputs of the whole; external ones follow.
+    signals: Vec<Signal>,
+    /// Engine and axis of each torque, the first outputs of the whole.
+    torques: Vec<(usize, usize)>,
+    /// The autopilot and its law, whether or not it acts.
+    autopilot: Option<(Autopilot, ControlLaw)>,
+    /// Nominal slopes of the modes at the grid of each sensor: sensors, then modes, rad/m per kg^1/2.
+    slopes: Vec<Vec<Vector3<f64>>>,
+    active: bool,
+}
+
+/// A linear combination of coordinates, or of their rates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Coordinates and factors.
+    pub entries: Vec<(usize, f64)>,
+    /// Whether it reads the rates.
+    pub rate: bool,
+}
+
+/// Names `prefix.<n>`, n from 1.
+fn numbered(prefix: &str, count: usize) -> impl Iterator<Item = String> {
+    (1..=count).map(move |n| format!("{prefix}.{n}"))
+}
+
+/// `command.<axis>` and the like.
+fn axes(prefix: &str) -> Vec<String> {
+    Axis::ALL.map(|axis| format!("{prefix}.{}", axis.name())).to_vec()
+}
+
+impl Servo {
+    /// The servo part of `vehicle` with the modes of `modes`, these engines gimballed, this feedback, and
+    /// the actuators of a set (engines without it keep their own).
+    ///
+    /// External inputs are the axis commands, where there is an autopilot, and the gimbal commands.
+    /// Outputs are the torques, and with feedback also `feedback.<axis>`.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn new(
+        vehicle: &Vehicle,
+        modes: &ModeSet,
+        gimballed: &[bool],
+        feedback: Feedback,
+        set: Option<&str>,
+    ) -> Result<Self, Error> {
+        if let Some(set) = set.filter(|set| !vehicle.actuator_sets().contains(set)) {
+            return Err(Error::NoSet(set.to_owned()));
+        }
+        let mut parts = Parts::default();
+        let gimbal = |engine: usize, axis: usize| {
+            let engine = &vehicle.engines[engine];
+            format!("{}.{}", engine.path(), engine.actuators[axis].name)
+        };
+        for (e, engine) in vehicle.engines.iter().enumerate().filter(|(e, _)| gimballed[*e]) {
+            let number = engine.set(set);
+            for axis in 0..2 {
+                parts.actuator(vehicle, [e, number, axis], &gimbal(e, axis));
+            }
+        }
+        if let Some(autopilot) = &vehicle.autopilot {
+            parts.allocation(autopilot, gimballed, gimbal);
+            parts.external.splice(0..0, axes("command"));
+        }
+        match (feedback, &vehicle.autopilot) {
+            (Feedback::Open, _) => {}
+            (_, None) => return Err(Error::NoAutopilot),
+            (_, Some(autopilot)) => {
+                let gimbals = &autopilot.allocation.gimbals;
+                if let Some((engine, _)) = gimbals.iter().find(|(engine, _)| !gimballed[*engine]) {
+                    return Err(Error::Locked(vehicle.engines[*engine].path()));
+                }
+                parts.autopilot(autopilot, if feedback == Feedback::Closed { -1.0 } else { 1.0 });
+            }
+        }
+        let Parts { blocks, sources, signals, names, torques, external, mut outputs } = parts;
+        let inputs = names.into_iter().chain(external).collect();
+        let gives = torques.iter().map(|&(e, axis)| format!("torque.{}", gimbal(e, axis)));
+        outputs.splice(0..0, gives);
+        let connection = Interconnection::new(&blocks, inputs, outputs)?;
+        let springs = sources.iter().all(|source| match source {
+            Source::Actuator(engine, set, axis) => {
+                let actuator = vehicle.engines[*engine].actuator(2 * set + axis);
+                matches!(actuator.law, Law::SecondOrder(_))
+            }
+            _ => true,
+        });
+        let autopilot = vehicle.autopilot.as_ref();
+        let servo = Self {
+            connection,
+            sources,
+            signals,
+            torques,
+            slopes: slopes(autopilot, modes)?,
+            autopilot: autopilot.map(|a| (a.clone(), ControlLaw::new(a))),
+            active: !springs || feedback != Feedback::Open,
+        };
+        // A draw changes numbers, not which of them are zero: what has no loop now never has one.
+        let nominal: Vec<StateSpace> =
+            servo.sources.iter().map(|source| servo.nominal(source, vehicle)).collect();
+        servo
+            .connection
+            .find_loop(&nominal)
+            .map_or(Ok(()), |ports| Err(Error::AlgebraicLoop(ports)))?;
+        Ok(servo)
+    }
+
+    /// Whether it adds anything to a model: springs between command and nozzle stand in the model
+    /// without it.
+    pub fn is_active(&self) -> bool {
+        self.active
+    }
+
+    /// The autopilot and its law in the frequency domain, if the vehicle has one.
+    pub fn autopilot(&self) -> Option<(&Autopilot, &ControlLaw)> {
+        self.autopilot.as_ref().map(|(autopilot, law)| (autopilot, law))
+    }
+
+    /// Names of the first-order states, for the layout.
+    pub fn states(&self) -> &[String] {
+        self.connection.states()
+    }
+
+    /// Names of the external inputs, the columns of [`Servo::inputs`].
+    pub fn externals(&self) -> &[String] {
+        &self.connection.inputs()[self.signals.len()..]
+    }
+
+    /// The whole of a drawn vehicle: from mechanical signals and external inputs to torques, N·m.
+    pub fn compose(&self, drawn: &DrawnVehicle) -> StateSpace {
+        let block = |source: &Source| match source {
+            Source::Actuator(engine, set, axis) => {
+                drawn.engines[*engine].actuators[*set][*axis].torque.clone()
+            }
+            Source::Fixed(system) => system.clone(),
+            Source::Path(path, weights) => {
+                let draw = &drawn.autopilot.paths[*path];
+                let filters = draw.filters.iter();
+                path_system(&self.paths()[*path], draw.gain, filters, weights)
+            }
+            Source::Axis(paths) => self.axis(drawn.autopilot.delay_s, *paths),
+        };
+        let blocks: Vec<StateSpace> = self.sources.iter().map(block).collect();
+        self.connection.compose(&blocks).expect("algebraic loops are refused when it is prepared")
+    }
+
+    /// A block as the vehicle has it nominally, with a gain of one on paths.
+    fn nominal(&self, source: &Source, vehicle: &Vehicle) -> StateSpace {
+        match source {
+            Source::Actuator(engine, set, axis) => {
+                vehicle.engines[*engine].actuator(2 * set + axis).law.state_space()
+            }
+            Source::Fixed(system) => system.clone(),
+            Source::Path(path, weights) => {
+                let path = &self.paths()[*path];
+                let draws: Vec<_> = path.filters.iter().map(|f| f.kind.nominal()).collect();
+                path_system(path, 1.0, draws.iter(), weights)
+            }
+            Source::Axis(paths) => {
+                self.axis(self.autopilot.as_ref().map_or(0.0, |(a, _)| a.delay_s), *paths)
+            }
+        }
+    }
+
+    fn paths(&self) -> &[Path] {
+        self.autopilot.as_ref().map_or(&[], |(autopilot, _)| &autopilot.paths)
+    }
+
+    /// The sum of as many paths, delayed.
+    fn axis(&self, delay_s: f64, paths: usize) -> StateSpace {
+        let order = self.autopilot.as_ref().map_or(1, |(autopilot, _)| autopilot.delay_order);
+        delay::pade(delay_s, order).after(&DMatrix::from_element(1, paths, 1.0))
+    }
+
+    /// Writes `composite` (see [`Servo::compose`]) into the model: with mechanical signals
+    /// y = S_q q + S_v q̇ and torques on the gimbal rotations by H, `K −= Hᵀ D S_q`, `D −= Hᵀ D S_v`,
+    /// `K_qa −= Hᵀ C`, `K_aq −= B S_q`, `D_aq −= B S_v`, `K_aa −= A`. The sensors are multiplied by
+    /// `feedback` (1 in flight), so that with 0 nothing senses the rigid body.
+    pub fn attach(
+        &self,
+        composite: &StateSpace,
+        drawn: &DrawnVehicle,
+        feedback: f64,
+        layout: &Layout,
+        model: &mut Model,
+    ) {
+        let first = layout.first_order().start;
+        let states = composite.order();
+        let rows: Vec<Option<usize>> = self.torques.iter().map(|&t| gimbal(layout, t)).collect();
+        for (column, &signal) in self.signals.iter().enumerate() {
+            let row = self.row(signal, drawn, layout);
+            let share = if matches!(signal, Signal::Sensor(..)) { feedback } else { 1.0 };
+            let matrix = if row.rate { &mut model.damping } else { &mut model.stiffness };
+            for &(coordinate, factor) in &row.entries {
+                let factor = share * factor;
+                for (torque, at) in rows.iter().enumerate() {
+                    let gain = composite.d[(torque, column)];
+                    if let Some(at) = at.filter(|_| gain != 0.0) {
+                        matrix[(at, coordinate)] -= gain * factor;
+                    }
+                }
+                for state in 0..states {
+                    matrix[(first + state, coordinate)] -= composite.b[(state, column)] * factor;
+                }
+            }
+        }
+        for column in 0..states {
+            for (torque, at) in rows.iter().enumerate() {
+                if let Some(at) = *at {
+                    model.stiffness[(at, first + column)] -= composite.c[(torque, column)];
+                }
+            }
+            for row in 0..states {
+                model.stiffness[(first + row, first + column)] -= composite.a[(row, column)];
+            }
+        }
+    }
+
+    /// What each external input does to the model: E of `M ẍ + D ẋ + K x = E w`, coordinates ×
+    /// [`Servo::externals`].
+    pub fn inputs(&self, composite: &StateSpace, layout: &Layout) -> DMatrix<f64> {
+        let (from, first) = (self.signals.len(), layout.first_order().start);
+        let mut matrix = DMatrix::zeros(layout.coordinates(), self.externals().len());
+        for column in 0..matrix.ncols() {
+            for (torque, &place) in self.torques.iter().enumerate() {
+                if let Some(at) = gimbal(layout, place) {
+                    matrix[(at, column)] += composite.d[(torque, from + column)];
+                }
+            }
+            for state in 0..composite.order() {
+                matrix[(first + state, column)] += composite.b[(state, from + column)];
+            }
+        }
+        matrix
+    }
+
+    /// What a sensor of the autopilot measures about an axis: `scale · (Ψ η + θ)` or its rate, rad or
+    /// rad/s; θ only where the rigid body is free.
+    ///
+    /// # Panics
+    /// If the vehicle has no such sensor.
+    pub fn sensor_row(
+        &self,
+        sensor: usize,
+        axis: Axis,
+        drawn: &DrawnVehicle,
+        layout: &Layout,
+    ) -> Row {
+        let (autopilot, _) = self.autopilot.as_ref().expect("sensors are those of an autopilot");
+        let draw = &drawn.autopilot.sensors[sensor];
+        let elastic = layout.elastic().zip(self.slopes[sensor].iter().zip(&draw.slope_gain));
+        let mut entries: Vec<(usize, f64)> = elastic
+            .map(|(at, (slope, gain))| (at, draw.scale * gain * slope[axis as usize]))
+            .collect();
+        entries.extend(layout.rotation().nth(axis as usize).map(|at| (at, draw.scale)));
+        Row { entries, rate: autopilot.sensors[sensor].kind == SensorKind::RateGyro }
+    }
+
+    fn row(&self, signal: Signal, drawn: &DrawnVehicle, layout: &Layout) -> Row {
+        let of = |engine, axis, rate| {
+            let coordinate = gimbal(layout, (engine, axis));
+            Row { entries: coordinate.map(|c| (c, 1.0)).into_iter().collect(), rate }
+        };
+        match signal {
+            Signal::Gimbal(engine, axis) => of(engine, axis, false),
+            Signal::GimbalRate(engine, axis) => of(engine, axis, true),
+            Signal::Sensor(sensor, axis) => self.sensor_row(sensor, axis, drawn, layout),
+        }
+    }
+}
+
+/// Slopes of the modes at the grids of the sensors.
+fn slopes(autopilot: Option<&Autopilot>, modes: &ModeSet) -> Result<Vec<Vec<Vector3<f64>>>, Error> {
+    let sensors = autopilot.map_or(&[][..], |autopilot| &autopilot.sensors);
+    let of = |sensor: &crate::vehicle::Sensor| {
+        let grid = modes.grid(&sensor.grid).ok_or_else(|| Error::MissingGrid {
+            sensor: sensor.name.clone(),
+            grid: sensor.grid.clone(),
+            time_s: modes.flight_time_s,
+        })?;
+        Ok(modes.modes.iter().map(|mode| mode.slope[grid]).collect())
+    };
+    sensors.iter().map(of).collect()
+}
+
+/// Coordinate of a gimbal rotation.
+fn gimbal(layout: &Layout, (engine, axis): (usize, usize)) -> Option<usize> {
+    layout.gimbal(engine).map(|first| first + axis)
+}
+
+/// Weighted inputs, gain and filters in series.
+fn path_system<'a>(
+    path: &Path,
+    gain: f64,
+    draws: impl Iterator<Item = &'a FilterDraw>,
+    weights: &DMatrix<f64>,
+) -> StateSpace {
+    let filters = path.filters.iter().zip(draws);
+    filters.fold(StateSpace::gain(weights * gain), |system, (filter, draw)| {
+        system.then(&filter.kind.state_space(draw))
+    })
+}
+
+/// Blocks as they are gathered.
+#[derive(Default)]
+struct Parts {
+    blocks: Vec<Block>,
+    sources: Vec<Source>,
+    signals: Vec<Signal>,
+    /// Names of the mechanical signals.
+    names: Vec<String>,
+    torques: Vec<(usize, usize)>,
+    external: Vec<String>,
+    /// Outputs beside the torques.
+    outputs: Vec<String>,
+}
+
+impl Parts {
+    fn add(
+        &mut self,
+        name: String,
+        inputs: Vec<String>,
+        outputs: Vec<String>,
+        states: Vec<String>,
+        source: Source,
+    ) {
+        self.blocks.push(Block { name, inputs, outputs, states });
+        self.sources.push(source);
+    }
+
+    fn actuator(&mut self, vehicle: &Vehicle, [e, set, axis]: [usize; 3], gimbal: &str) {
+        let engine = &vehicle.engines[e];
+        let actuator = engine.actuator(2 * set + axis);
+        let name = format!("actuator.{}.{}", engine.path(), actuator.name);
+        let (angle, rate) = (format!("theta.{gimbal}"), format!("d.theta.{gimbal}"));
+        self.signals.extend([Signal::Gimbal(e, axis), Signal::GimbalRate(e, axis)]);
+        self.names.extend([angle.clone(), rate.clone()]);
+        self.torques.push((e, axis));
+        self.external.push(format!("gimbal.{gimbal}"));
+        let states = numbered(&name, actuator.law.order()).collect();
+        let inputs = vec![format!("gimbal.{gimbal}"), angle, rate];
+        let output = vec![format!("torque.{gimbal}")];
+        self.add(name, inputs, output, states, Source::Actuator(e, set, axis));
+    }
+
+    fn allocation(
+        &mut self,
+        autopilot: &Autopilot,
+        gimballed: &[bool],
+        gimbal: impl Fn(usize, usize) -> String,
+    ) {
+        let allocation = &autopilot.allocation;
+        let free: Vec<usize> = (0..allocation.gimbals.len())
+            .filter(|&row| gimballed[allocation.gimbals[row].0])
+            .collect();
+        let of = |&row: &usize| {
+            let (engine, axis) = allocation.gimbals[row];
+            format!("gimbal.{}", gimbal(engine, axis))
+        };
+        let matrix = DMatrix::from_fn(free.len(), 3, |i, j| allocation.matrix[free[i]][j]);
+        let outputs = free.iter().map(of).collect();
+        let source = Source::Fixed(StateSpace::gain(matrix));
+        self.add("allocation".into(), axes("command"), outputs, Vec::new(), source);
+    }
+
+    /// Paths, the sum of each axis with the loop delay, and the sign with which it joins the command.
+    fn autopilot(&mut self, autopilot: &Autopilot, sign: f64) {
+        for (i, sensor) in autopilot.sensors.iter().enumerate() {
+            for axis in Axis::ALL {
+                let name = sensor.signal(axis);
+                let mut inputs = autopilot.paths.iter().flat_map(|path| &path.input);
+                if inputs.any(|(input, _)| *input == name) {
+                    self.signals.push(Signal::Sensor(i, axis));
+                    self.names.push(name);
+                }
+            }
+        }
+        for (i, path) in autopilot.paths.iter().enumerate() {
+            let weights = path.input.iter().map(|(_, weight)| *weight);
+            let weights = DMatrix::from_iterator(1, path.input.len(), weights);
+            let inputs = path.input.iter().map(|(signal, _)| signal.clone()).collect();
+            let name = path.signal();
+            let mut states = Vec::new();
+            for filter in &path.filters {
+                states.extend(numbered(&format!("{name}.{}", filter.name), filter.kind.order()));
+            }
+            self.add(name.clone(), inputs, vec![name], states, Source::Path(i, weights));
+        }
+        // An axis without a path has no feedback.
+        let mut feedback = Vec::new();
+        let mut command = Vec::new();
+        for axis in Axis::ALL {
+            let paths = autopilot.paths.iter().filter(|path| path.axis == Some(axis));
+            let inputs: Vec<String> = paths.map(Path::signal).collect();
+            if inputs.is_empty() {
+                continue;
+            }
+            let output = format!("feedback.{}", axis.name());
+            let order = if autopilot.delay_s == 0.0 { 0 } else { autopilot.delay_order };
+            let states = numbered(&format!("{output}.delay"), order).collect();
+            let source = Source::Axis(inputs.len());
+            self.add(output.clone(), inputs, vec![output.clone()], states, source);
+            feedback.push(output);
+            command.push(format!("command.{}", axis.name()));
+        }
+        let sign = DMatrix::identity(feedback.len(), feedback.len()) * sign;
+        let source = Source::Fixed(StateSpace::gain(sign));
+        self.outputs.extend(feedback.iter().cloned());
+        self.add("loop".into(), feedback, command, Vec::new(), source);
+    }
+}
