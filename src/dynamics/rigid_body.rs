@@ -59,6 +59,9 @@ pub fn attitude_columns(layout: &Layout, model: &Model) -> Vec<Vec<f64>> {
 ///
 /// No magnitude is compared: a state is null by the structure of the equations, or exactly unused.
 pub fn find_null_states(layout: &Layout, before: &[Vec<f64>], flow: Flow, model: &mut Model) {
+    if layout.rotation().is_empty() {
+        return;
+    }
     let second_order = layout.second_order();
     let undamped = |at: usize| model.damping.col(at).iter().all(|value| *value == 0.0);
     let mut positions = Vec::new();

@@ -448,6 +448,10 @@ fn twelve_rigid_poles_are_null_by_construction_and_flow_leaves_those_it_does_not
     other.axes.set_column(0, &other.thrust_direction.cross(&Vector3::z()).normalize());
     let second = other.thrust_direction.cross(&other.axes.column(0).into_owned());
     other.axes.set_column(1, &second);
+    let opposite = rigid_motion(&Vector3::new(30.0, 6.35, 0.4));
+    for (column, (shape, _)) in opposite.into_iter().enumerate() {
+        other.shape[column] = shape;
+    }
     two.attachments.push(other);
     pair.engines.push(DrawnEngine { mass_flow_kg_s: 5200.0, ..drawn.engines[0].clone() });
     let engines = ["left", "right"].map(|n| (format!("booster.{n}"), ["rock", "tilt"], true));
