@@ -84,6 +84,13 @@ pub struct Definition {
 }
 
 impl Definition {
+    /// Adds cases to the dispersed population and to every corner's Monte Carlo.
+    pub fn add_cases(&mut self, more: u64) {
+        for population in self.populations.iter_mut().filter(|p| p.drawn) {
+            population.cases = population.cases.saturating_add(more).min(MOST_CASES);
+        }
+    }
+
     /// Sets the number of cases of the dispersed population and of every corner's Monte Carlo.
     pub fn set_cases(&mut self, cases: u64) {
         for population in self.populations.iter_mut().filter(|p| p.drawn) {

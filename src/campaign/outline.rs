@@ -5,6 +5,8 @@
 use super::definition::Definition;
 use crate::dispersion::Draw;
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Which poles the `modes` table holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -97,6 +99,43 @@ impl Outline {
     ) -> Self {
         let program = env!("CARGO_PKG_VERSION").to_owned();
         Self { program, definition, poles, draws, inputs }
+    }
+
+    /// Digest of all but the number of drawn cases: what two parts of one campaign have in common.
+    pub fn identity(&self) -> String {
+        let mut open = self.clone();
+        open.definition.set_cases(0);
+        let text = serde_json::to_string(&open).expect("an outline has text keys only");
+        blake3::hash(text.as_bytes()).to_hex().to_string()
+    }
+
+    /// What differs from another outline apart from the number of drawn cases: name, here, there.
+    pub fn differences(&self, other: &Self) -> Vec<(String, String, String)> {
+        let open = |outline: &Self| {
+            let mut open = outline.clone();
+            open.definition.set_cases(0);
+            let inputs = std::mem::take(&mut open.inputs);
+            let value = serde_json::to_value(&open).expect("an outline has text keys only");
+            let mut found = BTreeMap::new();
+            let Value::Object(mut keys) = value else { return found };
+            if let Some(Value::Object(definition)) = keys.remove("definition") {
+                let inside = definition.into_iter();
+                found.extend(inside.map(|(key, value)| (key, value.to_string())));
+            }
+            found.extend(keys.into_iter().map(|(key, value)| (key, value.to_string())));
+            let digest = |input: Input| (input.name, format!("BLAKE3 {}", input.blake3));
+            found.extend(inputs.into_iter().map(digest));
+            found
+        };
+        let (here, there) = (open(self), open(other));
+        let names: BTreeSet<&String> = here.keys().chain(there.keys()).collect();
+        let text = |found: &BTreeMap<String, String>, name: &String| {
+            let text = found.get(name).map_or("nothing", String::as_str);
+            // Of a long list the place of the difference would not be seen anyway.
+            if text.len() > 100 { "other content".to_owned() } else { text.to_owned() }
+        };
+        let differ = names.into_iter().filter(|name| here.get(*name) != there.get(*name));
+        differ.map(|name| (name.clone(), text(&here, name), text(&there, name))).collect()
     }
 
     /// Number of cases of all populations.

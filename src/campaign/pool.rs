@@ -36,6 +36,36 @@ pub fn spans(populations: &[Population]) -> Vec<Span> {
     all.map(|(population, p)| Span { population, cases: 0..p.cases }).collect()
 }
 
+/// One of several parts of a campaign with about the same number of cases.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// Its number, from 1.
+    pub number: u64,
+    /// Number of parts.
+    pub of: u64,
+}
+
+impl Part {
+    /// The cases of the part: consecutive ones of all populations in canonical order.
+    pub fn spans(self, populations: &[Population]) -> Vec<Span> {
+        let total: u64 = populations.iter().map(|p| p.cases).sum();
+        let bound =
+            |number: u64| (u128::from(total) * u128::from(number) / u128::from(self.of)) as u64;
+        let (from, to) = (bound(self.number - 1), bound(self.number));
+        let mut before = 0;
+        let mut found = Vec::new();
+        for span in spans(populations) {
+            let cases = span.cases.end;
+            let inside = |case: u64| case.saturating_sub(before).min(cases);
+            if inside(from) < inside(to) {
+                found.push(Span { cases: inside(from)..inside(to), ..span });
+            }
+            before += cases;
+        }
+        found
+    }
+}
+
 /// How far a run has come; counts of cases.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Progress {
@@ -122,7 +152,7 @@ impl Pool {
                 for record in records {
                     counts.done += 1;
                     counts.failed += u64::from(record.failure().is_some());
-                    counts.unstable += u64::from(unstable(&record));
+                    counts.unstable += u64::from(record.unstable());
                     if let Err(error) = sink(record) {
                         abandoned.store(true, Ordering::Relaxed);
                         return Err(error);
@@ -179,11 +209,6 @@ fn message(payload: &(dyn Any + Send)) -> String {
     text.unwrap_or("a panic without a message").to_owned()
 }
 
-fn unstable(record: &Record) -> bool {
-    let poles = record.evaluations.iter().filter_map(|e| e.outcome.as_ref().ok()).flatten();
-    poles.into_iter().any(|pole| pole.mode.is_some() && pole.value.re > 0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::synthetic;
@@ -227,10 +252,26 @@ mod tests {
     }
 
     #[test]
+    fn parts_are_disjoint_and_hold_every_case() {
+        let definition = synthetic::definition(&[1, 50, 30]);
+        let cases = |spans: Vec<Span>| -> Vec<(usize, u64)> {
+            spans.into_iter().flat_map(|s| s.cases.map(move |case| (s.population, case))).collect()
+        };
+        let all = cases(spans(&definition.populations));
+        for of in [1, 2, 7, 81, 100] {
+            let part = |number| cases(Part { number, of }.spans(&definition.populations));
+            let parts: Vec<_> = (1..=of).map(part).collect();
+            assert_eq!(parts.concat(), all);
+            let most = parts.iter().map(Vec::len).max().unwrap() as u64;
+            assert!(most <= 81_u64.div_ceil(of));
+        }
+    }
+
+    #[test]
     fn failed_and_unstable_cases_are_counted() {
         let (all, progress) = records(2);
         assert_eq!(progress.failed as usize, all.iter().filter(|r| r.failure().is_some()).count());
-        assert_eq!(progress.unstable as usize, all.iter().filter(|r| unstable(r)).count());
+        assert_eq!(progress.unstable as usize, all.iter().filter(|r| r.unstable()).count());
         assert!(progress.failed > 0 && progress.unstable > 0);
     }
 

@@ -116,18 +116,28 @@ pub struct Pole {
 impl Pole {
     /// Frequency |Im s|/2π, Hz.
     pub fn frequency_hz(&self) -> f64 {
-        self.value.im.abs() / std::f64::consts::TAU
+        frequency_hz(self.value)
     }
 
     /// Damping ratio −Re s/|s|, −; not finite for a pole at the origin.
     pub fn damping_ratio(&self) -> f64 {
-        -self.value.re / self.value.norm()
+        damping_ratio(self.value)
     }
 
     /// Time to double ln 2/Re s, s, where Re s > 0.
     pub fn time_to_double_s(&self) -> Option<f64> {
         (self.value.re > 0.0).then(|| std::f64::consts::LN_2 / self.value.re)
     }
+}
+
+/// Frequency |Im s|/2π of a pole in rad/s, Hz.
+pub fn frequency_hz(pole: Complex<f64>) -> f64 {
+    pole.im.abs() / std::f64::consts::TAU
+}
+
+/// Damping ratio −Re s/|s| of a pole, −; not finite at the origin.
+pub fn damping_ratio(pole: Complex<f64>) -> f64 {
+    -pole.re / pole.norm()
 }
 
 /// One evaluation of a case: one variant at one flight time.
@@ -160,6 +170,12 @@ pub struct Record {
 }
 
 impl Record {
+    /// Whether a named mode is unstable in some evaluation.
+    pub fn unstable(&self) -> bool {
+        let poles = self.evaluations.iter().filter_map(|e| e.outcome.as_ref().ok()).flatten();
+        poles.into_iter().any(|pole| pole.mode.is_some() && pole.value.re > 0.0)
+    }
+
     /// The first failure of the case, in the order of its evaluations.
     pub fn failure(&self) -> Option<&Failure> {
         self.evaluations.iter().find_map(|e| e.outcome.as_ref().err())

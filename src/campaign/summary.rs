@@ -1,11 +1,13 @@
 //! The summary of a run: one row per population, variant, flight time and named mode, and one of
 //! the cases reduced to their worst flight time; the worst cases.
 //!
-//! Works on series with one number per case; where they are read from is decided in `io`.
+//! Works on cases that pass by one after the other, so that its memory does not grow with their
+//! number; where they are read from is decided in `io`.
 
 use super::definition::Definition;
 use crate::stats::{
-    Confidence, Drawing, Error, Estimate, Moments, Ordered, Probability, Sides, clopper_pearson,
+    Confidence, Drawing, Error, Estimate, Probability, RunningMoments, Selection, Sides,
+    clopper_pearson, quantile_of,
 };
 use std::f64::consts::LN_2;
 
@@ -37,48 +39,36 @@ pub struct Group {
     pub flight_time: Option<usize>,
 }
 
-/// What was found for each case of a group, by case index; NaN where the evaluation failed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Series {
+/// What was found for a case of a group; NaN where there is nothing, as after a failure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
     /// Damping ratio of the less stable pole, −.
-    pub damping_ratio: Vec<f64>,
+    pub damping_ratio: f64,
     /// Frequency of that pole, Hz.
-    pub frequency_hz: Vec<f64>,
+    pub frequency_hz: f64,
     /// Largest real part of the poles, rad/s.
-    pub pole_re_rad_s: Vec<f64>,
-    /// Gain of damping ratio over the first variant, −; empty for that variant.
-    pub damping_ratio_gain: Vec<f64>,
+    pub pole_re_rad_s: f64,
+    /// Gain of damping ratio over the first variant, −; NaN for that variant.
+    pub damping_ratio_gain: f64,
 }
 
-impl Series {
-    /// A series in which nothing has been evaluated yet.
-    pub fn unknown(cases: usize) -> Self {
-        Self {
-            damping_ratio: vec![f64::NAN; cases],
-            frequency_hz: vec![f64::NAN; cases],
-            pole_re_rad_s: vec![f64::NAN; cases],
-            damping_ratio_gain: Vec::new(),
-        }
-    }
+impl Found {
+    /// Nothing yet.
+    pub const NOTHING: Self = Self {
+        damping_ratio: f64::NAN,
+        frequency_hz: f64::NAN,
+        pole_re_rad_s: f64::NAN,
+        damping_ratio_gain: f64::NAN,
+    };
 
-    /// Bytes per case while a group is summed up, the sorted copy included.
-    pub const BYTES_PER_CASE: usize = 5 * size_of::<f64>();
-
-    /// Takes in a pole of a case; of several, the less stable one stays.
-    pub fn add(&mut self, case: usize, damping_ratio: f64, frequency_hz: f64, pole_re_rad_s: f64) {
-        let known = self.damping_ratio[case];
-        if known.is_nan() || damping_ratio < known {
-            self.damping_ratio[case] = damping_ratio;
-            self.frequency_hz[case] = frequency_hz;
+    /// Takes in a pole of the case; of several, the less stable one stays.
+    pub fn add(&mut self, damping_ratio: f64, frequency_hz: f64, pole_re_rad_s: f64) {
+        if self.damping_ratio.is_nan() || damping_ratio < self.damping_ratio {
+            self.damping_ratio = damping_ratio;
+            self.frequency_hz = frequency_hz;
         }
         // Of NaN and a number, the number.
-        self.pole_re_rad_s[case] = self.pole_re_rad_s[case].max(pole_re_rad_s);
-    }
-
-    /// Sets the gain of damping ratio over the first variant, case by case.
-    pub fn compare(&mut self, first: &[f64]) {
-        self.damping_ratio_gain =
-            self.damping_ratio.iter().zip(first).map(|(here, first)| here - first).collect();
+        self.pole_re_rad_s = self.pole_re_rad_s.max(pole_re_rad_s);
     }
 }
 
@@ -122,61 +112,142 @@ pub struct SummaryRow {
     pub damping_ratio_gain: Option<[f64; 2]>,
 }
 
-/// Sums up one group; `drawn` says whether its cases are independent draws.
+/// Sums up one group from its cases, which pass by in the order of their index, several times if
+/// there are too many to hold: all statistics are exact.
+#[derive(Debug, Clone)]
+pub struct Tally {
+    group: Group,
+    drawn: bool,
+    first_pass: bool,
+    cases: u64,
+    unstable: u64,
+    pole_re_max: f64,
+    damping: RunningMoments,
+    frequency: RunningMoments,
+    gain: RunningMoments,
+    gain_min: f64,
+    order: Selection,
+}
+
+impl Tally {
+    /// A tally of no cases that holds about `most` values; `drawn` says whether the cases of the
+    /// group are independent draws.
+    pub fn new(group: Group, drawn: bool, most: usize) -> Self {
+        Self {
+            group,
+            drawn,
+            first_pass: true,
+            cases: 0,
+            unstable: 0,
+            pole_re_max: f64::NEG_INFINITY,
+            damping: RunningMoments::default(),
+            frequency: RunningMoments::default(),
+            gain: RunningMoments::default(),
+            gain_min: f64::INFINITY,
+            order: Selection::new(most),
+        }
+    }
+
+    /// Takes the next case.
+    ///
+    /// # Errors
+    /// None for numbers that are finite or NaN; else what `stats` says of them.
+    pub fn add(&mut self, found: &Found) -> Result<(), Error> {
+        if self.first_pass {
+            self.cases += 1;
+            self.unstable += u64::from(found.pole_re_rad_s > 0.0);
+            self.pole_re_max = self.pole_re_max.max(found.pole_re_rad_s);
+            let known = |value: f64, moments: &mut RunningMoments| {
+                if value.is_nan() { Ok(()) } else { moments.push(value) }
+            };
+            known(found.damping_ratio, &mut self.damping)?;
+            known(found.frequency_hz, &mut self.frequency)?;
+            known(found.damping_ratio_gain, &mut self.gain)?;
+            self.gain_min = self.gain_min.min(found.damping_ratio_gain);
+        }
+        if !found.damping_ratio.is_nan() {
+            self.order.push(found.damping_ratio);
+        }
+        Ok(())
+    }
+
+    /// Ends a pass over all cases; whether it was the last.
+    ///
+    /// # Errors
+    /// None: the levels are levels.
+    pub fn end_pass(&mut self) -> Result<bool, Error> {
+        self.first_pass = false;
+        let count = self.order.count();
+        let mut ranks = vec![0, count.saturating_sub(1)];
+        if count > 0 {
+            for (level, _) in LEVELS {
+                quantile_of(count, Probability::new(level)?, |rank| {
+                    ranks.push(rank);
+                    0.0
+                });
+            }
+        }
+        Ok(self.order.end_pass(&ranks))
+    }
+
+    /// The row of the summary, once the last pass has ended.
+    ///
+    /// # Errors
+    /// What `stats` says.
+    pub fn row(&self) -> Result<SummaryRow, Error> {
+        let evaluated = self.order.count();
+        let drawing = if self.drawn { Drawing::Independent } else { Drawing::Designed };
+        let interval = match drawing.independent() {
+            Ok(independent) if evaluated > 0 => {
+                let confidence = Confidence::new(CONFIDENCE)?;
+                let unstable = self.unstable;
+                let share =
+                    clopper_pearson(unstable, evaluated, confidence, Sides::Two, independent)?;
+                Some([Estimate::lower(&share), Estimate::upper(&share)])
+            }
+            _ => None,
+        };
+        Ok(SummaryRow {
+            group: self.group,
+            cases: self.cases,
+            failures: self.cases - evaluated,
+            unstable: self.unstable,
+            share_unstable: (evaluated > 0).then(|| self.unstable as f64 / evaluated as f64),
+            share_unstable_interval: interval,
+            damping_ratio: self.spread()?,
+            frequency_hz_mean: self.frequency.moments().mean(),
+            time_to_double_min_s: (self.pole_re_max > 0.0).then(|| LN_2 / self.pole_re_max),
+            damping_ratio_gain: self.gain.moments().mean().map(|mean| [self.gain_min, mean]),
+        })
+    }
+
+    fn spread(&self) -> Result<Option<Spread>, Error> {
+        let (moments, count) = (self.damping.moments(), self.order.count());
+        let Some(mean) = moments.mean() else { return Ok(None) };
+        let mut quantiles = [0.0; LEVELS.len()];
+        for (quantile, (level, _)) in quantiles.iter_mut().zip(LEVELS) {
+            let level = Probability::new(level)?;
+            *quantile = quantile_of(count, level, |rank| self.order.value(rank));
+        }
+        Ok(Some(Spread {
+            mean,
+            standard_deviation: moments.standard_deviation(),
+            smallest: self.order.value(0),
+            quantiles,
+            largest: self.order.value(count - 1),
+        }))
+    }
+}
+
+/// Sums up one group whose cases are at hand; `drawn` says whether they are independent draws.
 ///
 /// # Errors
-/// None for a series whose numbers are finite or NaN; else what `stats` says of them.
-pub fn summarise(group: Group, drawn: bool, series: &Series) -> Result<SummaryRow, Error> {
-    let damping: Vec<f64> = known(&series.damping_ratio);
-    let frequency: Vec<f64> = known(&series.frequency_hz);
-    let gain: Vec<f64> = known(&series.damping_ratio_gain);
-    let (cases, evaluated) = (series.damping_ratio.len() as u64, damping.len() as u64);
-    let re_max = series.pole_re_rad_s.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let unstable = series.pole_re_rad_s.iter().filter(|re| **re > 0.0).count() as u64;
-    let drawing = if drawn { Drawing::Independent } else { Drawing::Designed };
-    let interval = match drawing.independent() {
-        Ok(independent) if evaluated > 0 => {
-            let confidence = Confidence::new(CONFIDENCE)?;
-            let share = clopper_pearson(unstable, evaluated, confidence, Sides::Two, independent)?;
-            Some([Estimate::lower(&share), Estimate::upper(&share)])
-        }
-        _ => None,
-    };
-    Ok(SummaryRow {
-        group,
-        cases,
-        failures: cases - evaluated,
-        unstable,
-        share_unstable: (evaluated > 0).then(|| unstable as f64 / evaluated as f64),
-        share_unstable_interval: interval,
-        damping_ratio: spread(damping)?,
-        frequency_hz_mean: Moments::of(&frequency)?.mean(),
-        time_to_double_min_s: (re_max > 0.0).then(|| LN_2 / re_max),
-        damping_ratio_gain: Moments::of(&gain)?
-            .mean()
-            .map(|mean| [gain.iter().copied().fold(f64::INFINITY, f64::min), mean]),
-    })
-}
-
-fn known(values: &[f64]) -> Vec<f64> {
-    values.iter().copied().filter(|value| !value.is_nan()).collect()
-}
-
-fn spread(values: Vec<f64>) -> Result<Option<Spread>, Error> {
-    let moments = Moments::of(&values)?;
-    let Some(mean) = moments.mean() else { return Ok(None) };
-    let ordered = Ordered::new(&values)?;
-    let mut quantiles = [0.0; LEVELS.len()];
-    for (quantile, (level, _)) in quantiles.iter_mut().zip(LEVELS) {
-        *quantile = ordered.quantile(Probability::new(level)?);
-    }
-    Ok(Some(Spread {
-        mean,
-        standard_deviation: moments.standard_deviation(),
-        smallest: ordered.smallest(),
-        quantiles,
-        largest: ordered.largest(),
-    }))
+/// None for numbers that are finite or NaN; else what `stats` says of them.
+pub fn summarise(group: Group, drawn: bool, cases: &[Found]) -> Result<SummaryRow, Error> {
+    let mut tally = Tally::new(group, drawn, usize::MAX);
+    cases.iter().try_for_each(|found| tally.add(found))?;
+    tally.end_pass()?;
+    tally.row()
 }
 
 /// Every group of a population in the order of the summary: by variant, flight time (the worst
@@ -221,16 +292,34 @@ pub struct WorstRow {
     pub score: Option<f64>,
 }
 
-/// Indices of the `most` smallest values, the smallest first, equal ones by index; NaN is no value.
-pub fn smallest(values: &[f64], most: usize) -> Vec<usize> {
-    let mut found: Vec<usize> = Vec::with_capacity(most.saturating_add(1).min(values.len()));
-    for (index, value) in values.iter().enumerate().filter(|(_, value)| !value.is_nan()) {
-        if found.len() < most || found.last().is_some_and(|last| *value < values[*last]) {
-            found.insert(found.partition_point(|other| values[*other] <= *value), index);
-            found.truncate(most);
+/// The smallest of many values, each with what belongs to it; of equal ones the earlier.
+#[derive(Debug, Clone)]
+pub struct Smallest<T> {
+    most: usize,
+    found: Vec<(f64, T)>,
+}
+
+impl<T> Smallest<T> {
+    /// None yet, and at most `most`.
+    pub fn new(most: usize) -> Self {
+        Self { most, found: Vec::new() }
+    }
+
+    /// Takes a value; NaN is none.
+    pub fn push(&mut self, value: f64, item: impl FnOnce() -> T) {
+        let full = self.found.len() >= self.most;
+        let better = !full || self.found.last().is_some_and(|(last, _)| value < *last);
+        if better && !value.is_nan() && self.most > 0 {
+            let at = self.found.partition_point(|(other, _)| *other <= value);
+            self.found.insert(at, (value, item()));
+            self.found.truncate(self.most);
         }
     }
-    found
+
+    /// The values and what belongs to them, the smallest first.
+    pub fn into_found(self) -> Vec<(f64, T)> {
+        self.found
+    }
 }
 
 #[cfg(test)]
@@ -239,12 +328,15 @@ mod tests {
 
     const GROUP: Group = Group { population: 0, variant: 1, mode: 0, flight_time: Some(0) };
 
-    fn series(damping: &[f64]) -> Series {
-        let mut series = Series::unknown(damping.len());
-        for (case, damping) in damping.iter().enumerate().filter(|(_, d)| !d.is_nan()) {
-            series.add(case, *damping, 5.0, -damping * 31.0);
-        }
-        series
+    fn series(damping: &[f64]) -> Vec<Found> {
+        let found = |damping: &f64| {
+            let mut found = Found::NOTHING;
+            if !damping.is_nan() {
+                found.add(*damping, 5.0, -damping * 31.0);
+            }
+            found
+        };
+        damping.iter().map(found).collect()
     }
 
     #[test]
@@ -282,25 +374,53 @@ mod tests {
     #[test]
     fn the_gain_is_paired_case_by_case() {
         let mut with = series(&[0.03, 0.02, f64::NAN]);
-        with.compare(&[0.01, f64::NAN, 0.01]);
+        for (found, first) in with.iter_mut().zip([0.01, f64::NAN, 0.01]) {
+            found.damping_ratio_gain = found.damping_ratio - first;
+        }
         let [least, mean] = summarise(GROUP, true, &with).unwrap().damping_ratio_gain.unwrap();
         assert_eq!((least, mean), (0.03 - 0.01, 0.03 - 0.01));
     }
 
     #[test]
     fn of_several_poles_the_less_stable_one_stays() {
-        let mut series = Series::unknown(1);
-        series.add(0, 0.02, 5.0, -0.6);
-        series.add(0, -0.01, 5.5, 0.3);
-        series.add(0, 0.05, 4.0, -1.0);
-        assert_eq!(series.damping_ratio, [-0.01]);
-        assert_eq!(series.frequency_hz, [5.5]);
-        assert_eq!(series.pole_re_rad_s, [0.3]);
+        let mut found = Found::NOTHING;
+        found.add(0.02, 5.0, -0.6);
+        found.add(-0.01, 5.5, 0.3);
+        found.add(0.05, 4.0, -1.0);
+        assert_eq!((found.damping_ratio, found.frequency_hz), (-0.01, 5.5));
+        assert_eq!(found.pole_re_rad_s, 0.3);
+    }
+
+    #[test]
+    fn a_row_is_the_same_to_the_last_bit_however_few_values_are_held() {
+        let damping: Vec<f64> = (0..5000)
+            .map(|i| if i % 50 == 3 { f64::NAN } else { (f64::from(i) * 0.7).sin() * 0.02 })
+            .collect();
+        let cases = series(&damping);
+        let whole = summarise(GROUP, true, &cases).unwrap();
+        for most in [0, 10, 1000] {
+            let mut tally = Tally::new(GROUP, true, most);
+            let mut passes = 0;
+            loop {
+                cases.iter().for_each(|found| tally.add(found).unwrap());
+                passes += 1;
+                if tally.end_pass().unwrap() {
+                    break;
+                }
+            }
+            assert!(passes > 1);
+            assert_eq!(tally.row().unwrap(), whole);
+        }
     }
 
     #[test]
     fn the_smallest_values_come_in_order_with_ties_by_index() {
         let values = [3.0, f64::NAN, 1.0, 2.0, 1.0, 5.0, -1.0];
+        let smallest = |values: &[f64], most: usize| -> Vec<usize> {
+            let mut smallest = Smallest::new(most);
+            values.iter().enumerate().for_each(|(index, value)| smallest.push(*value, || index));
+            smallest.into_found().into_iter().map(|(_, index)| index).collect()
+        };
         assert_eq!(smallest(&values, 4), [6, 2, 4, 3]);
         assert_eq!(smallest(&values, 100), [6, 2, 4, 3, 0, 5]);
         assert_eq!(smallest(&values, 0), [0; 0]);

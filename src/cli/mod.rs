@@ -4,6 +4,7 @@
 //! returns the exit code. Nothing here computes.
 
 pub mod actuator;
+pub mod campaign;
 pub mod check;
 pub mod completions;
 pub mod error;
@@ -12,14 +13,18 @@ pub mod how_many;
 pub mod init;
 pub mod interrupt;
 pub mod margins;
+pub mod merge;
 pub mod modes;
 pub mod nominal;
+pub mod part;
 pub mod plan;
 pub mod planar;
 pub mod progress;
 pub mod replay;
+pub mod retry;
 pub mod run;
 pub mod schema;
+pub mod status;
 pub mod summary;
 
 pub use error::Error;
@@ -56,6 +61,9 @@ enum Command {
     Modes(modes::Args),
     Nominal(nominal::Args),
     Run(run::Args),
+    Merge(merge::Args),
+    Status(status::Args),
+    Retry(retry::Args),
     Summary(summary::Args),
     Gate(gate::Args),
     Replay(replay::Args),
@@ -111,6 +119,9 @@ pub fn run() -> ExitCode {
         Command::Modes(args) => modes::run(args, &mut out),
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),
+        Command::Merge(args) => merge::run(args, &mut out),
+        Command::Status(args) => status::run(args, &mut out),
+        Command::Retry(args) => retry::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),

@@ -19,6 +19,7 @@ enum Level {
     Vehicle,
     Engine,
     Actuator,
+    Tank,
     Mode,
     Sensor,
     Path,
@@ -26,10 +27,11 @@ enum Level {
 }
 
 impl Level {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 8] = [
         Self::Vehicle,
         Self::Engine,
         Self::Actuator,
+        Self::Tank,
         Self::Mode,
         Self::Sensor,
         Self::Path,
@@ -41,6 +43,7 @@ impl Level {
             Self::Vehicle => "vehicle",
             Self::Engine => "engine",
             Self::Actuator => "actuator",
+            Self::Tank => "tank",
             Self::Mode => "mode",
             Self::Sensor => "sensor",
             Self::Path => "path",
@@ -58,6 +61,7 @@ impl Level {
             Self::Sensor => matches!(scope, Scope::Sensor | Scope::SensorMode),
             Self::Path => matches!(scope, Scope::Path | Scope::Filter),
             Self::Filter => scope == Scope::Filter,
+            Self::Tank => scope == Scope::Tank,
         }
     }
 
@@ -67,6 +71,7 @@ impl Level {
             "<group>" | "<engine>" | "<sensor>" | "<path>" => self != Self::Vehicle,
             "<actuator>" => self == Self::Actuator,
             "<filter>" => self == Self::Filter,
+            "<tank>" => self == Self::Tank,
             "<label>" => self == Self::Mode,
             _ => false,
         }

@@ -51,13 +51,13 @@ impl TankAttachment {
                 }
             }
         }
-        for local in columns.body..columns.count() {
+        for (local, displacement) in displacement.iter().enumerate().skip(columns.body) {
             let at = columns.coordinate(local);
             let omega = tank.frequency_rad_s;
             model.stiffness[(at, at)] += mass * omega * omega;
             model.damping[(at, at)] += 2.0 * tank.damping_ratio * mass * omega;
             if columns.rigid > 0 {
-                let moment = acceleration.cross(&displacement[local]) * -mass;
+                let moment = acceleration.cross(displacement) * -mass;
                 for mode in columns.rigid..columns.body {
                     let value = self.slope[mode].dot(&moment);
                     model.stiffness[(mode, at)] += value;

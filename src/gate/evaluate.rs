@@ -9,10 +9,10 @@
 use super::outcome::{Offender, Outcome};
 use super::resolve::{Claim, Plan, Run, column_unit, resolve};
 use super::rule::{Gate, Sense, Statistic};
-use super::source::{CaseValue, Metric, MissingMeans, Names, Query, Source, Worst};
+use super::source::{CaseValue, MissingMeans, Names, Query, Source, Worst};
 use super::verdict::Verdict;
 use crate::problem::Problems;
-use crate::stats::{self, Probability, Sides, Tails};
+use crate::stats::{self, Confidence, Probability, Selection, Sides, Tails};
 
 /// Checks gates read from `file` against what a run has, finished or planned.
 ///
@@ -61,16 +61,39 @@ fn violates(gate: &Gate, value: f64) -> bool {
     !good
 }
 
-/// The cases of a gate, worst first: failed ones, then by value, then those where none applies.
+/// The cases of a gate, ranked from the worst: failed ones, then by value, then those where none
+/// applies. Memory does not grow with their number.
 struct Cases {
-    ordered: Vec<CaseValue>,
+    count: u64,
     failures: u64,
     violations: u64,
+    /// The worst with a value.
+    worst: Option<CaseValue>,
+    /// The worst of those that count against the gate, the worst first.
+    offenders: Vec<CaseValue>,
+    /// Badness of every case: the smaller, the worse.
+    order: Selection,
+    sign: f64,
 }
 
+/// Values held at once while a gate is evaluated.
+const HELD: usize = 2 << 20;
+
 impl Cases {
-    fn of(gate: &Gate, metric: &Metric, mut values: Vec<CaseValue>) -> Self {
-        for case in &mut values {
+    fn of(
+        gate: &Gate,
+        plan: &Plan<'_>,
+        source: &impl Source,
+        query: &Query<'_>,
+    ) -> Result<Self, Problems> {
+        let metric = plan.metric;
+        let sign = if worst(gate) == Worst::Smallest { 1.0 } else { -1.0 };
+        let badness = |case: &CaseValue| match case.value {
+            Err(_) => f64::NEG_INFINITY,
+            Ok(Some(value)) => sign * value,
+            Ok(None) => f64::INFINITY,
+        };
+        let checked = |mut case: CaseValue| {
             match case.value {
                 Ok(Some(value)) if !value.is_finite() => {
                     case.value = Err(format!("{} is {value}", metric.name));
@@ -80,29 +103,89 @@ impl Cases {
                 }
                 _ => {}
             }
-        }
-        let sign = if worst(gate) == Worst::Smallest { 1.0 } else { -1.0 };
-        let badness = |case: &CaseValue| match case.value {
-            Err(_) => f64::NEG_INFINITY,
-            Ok(Some(value)) => sign * value,
-            Ok(None) => f64::INFINITY,
+            case
         };
-        // Stable: equal values stay in the order of their cases.
-        values.sort_by(|a, b| badness(a).total_cmp(&badness(b)));
-        let failures = values.iter().filter(|case| case.value.is_err()).count() as u64;
-        let violations = values.iter().filter(|case| offends(gate, case)).count() as u64;
-        Self { ordered: values, failures, violations }
+        let order = Selection::new(HELD);
+        let (worst, offenders) = (None, Vec::new());
+        let mut cases =
+            Self { count: 0, failures: 0, violations: 0, worst, offenders, order, sign };
+        let mut last = None;
+        let mut sound = true;
+        source.visit(query, &mut |case| {
+            sound &= last < Some(case.case) && case.case < plan.population.planned;
+            last = Some(case.case);
+            let case = checked(case);
+            let bad = badness(&case);
+            cases.count += 1;
+            cases.failures += u64::from(case.value.is_err());
+            cases.order.push(bad);
+            if matches!(case.value, Ok(Some(_)))
+                && cases.worst.as_ref().is_none_or(|worst| bad < badness(worst))
+            {
+                cases.worst = Some(case.clone());
+            }
+            if offends(gate, &case) {
+                cases.violations += 1;
+                // Equal values stay in the order of their cases.
+                let at = cases.offenders.partition_point(|other| badness(other) <= bad);
+                if at < Outcome::OFFENDERS {
+                    cases.offenders.insert(at, case);
+                    cases.offenders.truncate(Outcome::OFFENDERS);
+                }
+            }
+            Ok(())
+        })?;
+        if !sound {
+            return Err(Problems::damage(
+                "cases",
+                &gate.selection.population,
+                "cases out of order, twice, or beyond those planned",
+                format!("each of {} cases once, in order", plan.population.planned),
+            ));
+        }
+        let asked = ranks(plan, cases.count);
+        let ranks: Vec<u64> = asked.into_iter().filter(|rank| *rank < cases.count).collect();
+        while !cases.order.end_pass(&ranks) {
+            source.visit(query, &mut |case| {
+                cases.order.push(badness(&checked(case)));
+                Ok(())
+            })?;
+        }
+        Ok(cases)
     }
 
     fn len(&self) -> u64 {
-        self.ordered.len() as u64
+        self.count
     }
 
     /// The value that `skip` cases are worse than; `None` beyond the last and where none stands.
+    /// Only ranks of [`ranks`] may be asked for.
     fn value_after(&self, skip: u64) -> Option<f64> {
-        let case = self.ordered.get(usize::try_from(skip).ok()?)?;
-        case.value.as_ref().ok().copied().flatten()
+        let badness = (skip < self.count).then(|| self.order.value(skip))?;
+        badness.is_finite().then_some(self.sign * badness)
     }
+}
+
+/// Ranks that the value and the bound of a gate lie at in `n` cases, from the worst, 0.
+fn ranks(plan: &Plan<'_>, n: u64) -> Vec<u64> {
+    match plan.claim {
+        Claim::Every => vec![0],
+        Claim::Share { allowed, confidence, .. } => {
+            let most = most_violations(n, allowed, confidence);
+            most.into_iter().chain([own_rank(n, allowed)]).collect()
+        }
+    }
+}
+
+/// The rank that the allowed share of the cases is worse than.
+fn own_rank(n: u64, allowed: Probability) -> u64 {
+    (allowed.get() * n as f64).floor() as u64
+}
+
+/// The most violations that would pass in `n` cases.
+fn most_violations(n: u64, allowed: Probability, confidence: Confidence) -> Option<u64> {
+    let coverage = Probability::new(1.0 - allowed.get()).ok()?;
+    stats::most_exceedances(n, coverage, confidence, Tails::One)
 }
 
 fn offends(gate: &Gate, case: &CaseValue) -> bool {
@@ -115,7 +198,7 @@ fn offends(gate: &Gate, case: &CaseValue) -> bool {
 
 fn outcome(gate: &Gate, plan: &Plan<'_>, source: &impl Source) -> Result<Outcome, Problems> {
     let selection = &gate.selection;
-    let values = source.values(&Query {
+    let query = Query {
         metric: plan.metric,
         population: &selection.population,
         variant: selection.variant.as_deref(),
@@ -123,20 +206,9 @@ fn outcome(gate: &Gate, plan: &Plan<'_>, source: &impl Source) -> Result<Outcome
         flight_times_s: selection.flight_times_s.as_deref(),
         mode: selection.mode.as_deref(),
         worst: worst(gate),
-    })?;
-    let planned = plan.population.planned;
-    let sound = values.is_sorted_by(|a, b| a.case < b.case)
-        && values.last().is_none_or(|last| last.case < planned);
-    if !sound {
-        return Err(Problems::damage(
-            "cases",
-            &selection.population,
-            "cases out of order, twice, or beyond those planned",
-            format!("each of {planned} cases once, in order"),
-        ));
-    }
-    let missing = planned - values.len() as u64;
-    let cases = Cases::of(gate, plan.metric, values);
+    };
+    let cases = Cases::of(gate, plan, source, &query)?;
+    let missing = plan.population.planned - cases.len();
     let verdict = verdict(gate, plan, &cases, missing);
     Ok(describe(gate, plan, &cases, missing, verdict))
 }
@@ -180,9 +252,7 @@ fn value_and_bound(
         let worst = cases.value_after(0).map(|value| value / scale);
         return (worst, worst, Some(0));
     };
-    let coverage = Probability::new(1.0 - allowed.get()).ok();
-    let most =
-        coverage.and_then(|coverage| stats::most_exceedances(n, coverage, confidence, Tails::One));
+    let most = most_violations(n, allowed, confidence);
     if matches!(gate.statistic, Statistic::ShareBelow { .. } | Statistic::ShareAbove { .. }) {
         let share =
             stats::clopper_pearson(cases.violations, n, confidence, Sides::Upper, independent).ok();
@@ -193,8 +263,7 @@ fn value_and_bound(
         (share.map(|share| shown(share.point())), share.map(|share| shown(share.upper())), most)
     } else {
         // The sample's own order statistic, that the allowed share of the cases is worse than.
-        let skip = (allowed.get() * n as f64).floor() as u64;
-        let value = cases.value_after(skip).map(|value| value / scale);
+        let value = cases.value_after(own_rank(n, allowed)).map(|value| value / scale);
         let bound = most.and_then(|most| cases.value_after(most)).map(|value| value / scale);
         (value, bound, most)
     }
@@ -209,12 +278,10 @@ fn describe(
 ) -> Outcome {
     let (value, bound, most_violations) = value_and_bound(gate, plan, cases);
     let needed = Needed::of(gate, plan, cases);
-    let worst = cases.ordered.iter().find(|case| matches!(case.value, Ok(Some(_))));
+    let worst = cases.worst.as_ref();
     let offenders = cases
-        .ordered
+        .offenders
         .iter()
-        .filter(|case| offends(gate, case))
-        .take(Outcome::OFFENDERS)
         .map(|case| Offender {
             case: case.case,
             value: case.value.as_ref().ok().copied().flatten(),

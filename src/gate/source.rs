@@ -100,8 +100,13 @@ pub trait Names {
 
 /// A finished run as gates see it.
 pub trait Source: Names {
-    /// One value for each case that is present, in ascending order of case, by [`reduce`].
-    fn values(&self, query: &Query<'_>) -> Result<Vec<CaseValue>, Problems>;
+    /// Hands one value for each case that is present to `visit`, in ascending order of case, by
+    /// [`reduce`]; the same ones each time.
+    fn visit(
+        &self,
+        query: &Query<'_>,
+        visit: &mut dyn FnMut(CaseValue) -> Result<(), Problems>,
+    ) -> Result<(), Problems>;
 }
 
 /// Reduces the selected rows of a case to its worst.

@@ -124,11 +124,6 @@ impl<R> Column<R> {
             ("description".to_owned(), self.description.clone()),
         ])
     }
-
-    /// Whether equal values are worth storing once: text, not numbers.
-    pub fn repeats(&self) -> bool {
-        matches!(self.get, Get::Word(..) | Get::Text(_))
-    }
 }
 
 /// The values of a column gathered for one row group.

@@ -5,6 +5,7 @@
 
 #![expect(clippy::disallowed_methods, reason = "the place where the program touches the disk")]
 
+use super::fault;
 use crate::problem::Problems;
 use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -82,6 +83,96 @@ pub fn create_folder(path: &Path) -> Result<(), Problems> {
     })
 }
 
+/// Makes a folder, and those above it, unless it is there.
+///
+/// # Errors
+/// One problem if it cannot be made.
+pub fn ensure_folder(path: &Path) -> Result<(), Problems> {
+    fault::step().and_then(|()| fs::create_dir_all(path)).map_err(|e| write_problem(path, &e))
+}
+
+/// Names in a folder, in order; none where there is no such folder.
+///
+/// # Errors
+/// One problem if it cannot be read.
+pub fn names(folder: &Path) -> Result<Vec<String>, Problems> {
+    let failed = |e: io::Error| problem(folder, &e, "a readable folder");
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        other => other.map_err(failed)?,
+    };
+    let mut names = Vec::new();
+    for entry in entries {
+        names.push(entry.map_err(failed)?.file_name().to_string_lossy().into_owned());
+    }
+    names.sort();
+    Ok(names)
+}
+
+/// Renames a file or folder inside one folder, for good.
+///
+/// # Errors
+/// One problem if it cannot be renamed.
+pub fn rename(from: &Path, to: &Path) -> Result<(), Problems> {
+    fault::step()
+        .and_then(|()| fs::rename(from, to))
+        .and_then(|()| sync_parent(to))
+        .map_err(|e| write_problem(to, &e))
+}
+
+/// Removes a file; one that is not there is removed.
+///
+/// # Errors
+/// One problem if it cannot be removed.
+pub fn remove(path: &Path) -> Result<(), Problems> {
+    fault::step().map_err(|e| write_problem(path, &e))?;
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(write_problem(path, &error)),
+        _ => Ok(()),
+    }
+}
+
+/// What the name of a file written aside begins with.
+pub const ASIDE: &str = ".aside-";
+
+/// Removes what a process that was killed has left written aside in `folder`.
+pub fn sweep(folder: &Path) {
+    for name in names(folder).unwrap_or_default() {
+        if name.starts_with(ASIDE) {
+            let path = folder.join(name);
+            let _ = fs::remove_file(&path).or_else(|_| fs::remove_dir_all(&path));
+        }
+    }
+}
+
+/// The beginning of a file, up to and without its first line feed.
+///
+/// # Errors
+/// What the system says; a line longer than `most` bytes.
+pub fn first_line(path: &Path, most: usize) -> io::Result<Vec<u8>> {
+    let mut line = Vec::new();
+    let mut file = io::BufReader::new(File::open(path)?).take(most as u64);
+    io::BufRead::read_until(&mut file, b'\n', &mut line)?;
+    match line.pop() {
+        Some(b'\n') => Ok(line),
+        _ => Err(io::Error::new(io::ErrorKind::InvalidData, "no first line")),
+    }
+}
+
+/// The bytes of a file that lie `skip` bytes behind the beginning of its last `tail` bytes.
+///
+/// # Errors
+/// What the system says; a file that is too short.
+pub fn read_tail(path: &Path, tail: u64, skip: u64, length: u64) -> io::Result<Vec<u8>> {
+    let mut file = File::open(path)?;
+    let start = file.metadata()?.len().checked_sub(tail);
+    let start = start.ok_or_else(|| io::Error::from(io::ErrorKind::UnexpectedEof))?;
+    file.seek(SeekFrom::Start(start + skip))?;
+    let mut bytes = Vec::new();
+    file.take(length).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
 /// Refuses a name that something has already.
 ///
 /// # Errors
@@ -113,12 +204,18 @@ pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Problems> {
 
 /// Removes a folder with all that is in it, as far as the system lets it go.
 pub fn remove_folder(path: &Path) {
+    if fault::gone() {
+        return;
+    }
     // What cannot be removed, or is gone already, is no error of this call.
     let _ = fs::remove_dir_all(path);
 }
 
 /// Removes a folder if it is empty; anything else stays as it is.
 pub fn remove_if_empty(path: &Path) {
+    if fault::gone() {
+        return;
+    }
     // A folder that is not empty or already gone is no error of this call.
     let _ = fs::remove_dir(path);
 }
@@ -126,7 +223,7 @@ pub fn remove_if_empty(path: &Path) {
 /// A file being written aside; it takes its final name in [`Aside::finish`] and vanishes if dropped.
 #[derive(Debug)]
 pub struct Aside {
-    file: NamedTempFile,
+    file: Option<NamedTempFile>,
     target: PathBuf,
 }
 
@@ -149,8 +246,9 @@ impl Aside {
     /// # Errors
     /// One problem if the folder is missing, not writable or full.
     pub fn within(folder: &Path, target: &Path) -> Result<Self, Problems> {
+        fault::step().map_err(|e| write_problem(target, &e))?;
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".aside-");
+        builder.prefix(ASIDE);
         #[cfg(unix)]
         {
             // The usual rights of a new file, less the user's mask, not those of a secret.
@@ -159,7 +257,7 @@ impl Aside {
         }
         let mut file = builder.tempfile_in(folder).map_err(|e| write_problem(target, &e))?;
         probe(file.as_file_mut()).map_err(|e| write_problem(target, &e))?;
-        Ok(Self { file, target: target.to_owned() })
+        Ok(Self { file: Some(file), target: target.to_owned() })
     }
 
     /// The final name.
@@ -172,29 +270,79 @@ impl Aside {
     /// # Errors
     /// One problem if the disk is full or the file cannot be renamed; nothing is left behind.
     pub fn finish(self) -> Result<(), Problems> {
-        let Self { file, target } = self;
-        file.as_file().sync_all().map_err(|e| write_problem(&target, &e))?;
-        file.persist(&target).map_err(|e| write_problem(&target, &e.error))?;
-        // The rename itself is durable once the folder is synced; where folders cannot be
-        // opened (not on Unix) the system decides.
-        #[cfg(unix)]
-        if let Some(parent) = target.parent() {
-            let folder = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
-            File::open(folder)
-                .and_then(|f| f.sync_all())
-                .map_err(|e| write_problem(&target, &e))?;
-        }
-        Ok(())
+        self.sync().map_err(|e| write_problem(&self.target, &e))?;
+        let (file, target) = self.into_parts();
+        let renamed = fault::step().and_then(|()| file.persist(&target).map_err(|e| e.error));
+        renamed.and_then(|_| sync_parent(&target)).map_err(|e| write_problem(&target, &e))
     }
+
+    /// Like [`Aside::finish`], but leaves a file that has the name already; whether it was given.
+    ///
+    /// # Errors
+    /// As [`Aside::finish`].
+    pub fn finish_new(self) -> Result<bool, Problems> {
+        self.sync().map_err(|e| write_problem(&self.target, &e))?;
+        let (file, target) = self.into_parts();
+        let failed = |e: io::Error| write_problem(&target, &e);
+        fault::step().map_err(failed)?;
+        match file.persist_noclobber(&target) {
+            Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
+            Err(error) => Err(failed(error.error)),
+            Ok(_) => sync_parent(&target).map(|()| true).map_err(failed),
+        }
+    }
+
+    fn sync(&self) -> io::Result<()> {
+        fault::step()?;
+        self.file().as_file().sync_all()
+    }
+
+    fn file(&self) -> &NamedTempFile {
+        self.file.as_ref().expect("there until it is finished")
+    }
+
+    fn into_parts(mut self) -> (NamedTempFile, PathBuf) {
+        let file = self.file.take().expect("there until it is finished");
+        (file, std::mem::take(&mut self.target))
+    }
+}
+
+impl Drop for Aside {
+    fn drop(&mut self) {
+        // A power failure tidies nothing up; otherwise the file vanishes with its handle.
+        if let Some(file) = self.file.take().filter(|_| fault::gone()) {
+            let _ = file.keep();
+        }
+    }
+}
+
+/// Makes a new name durable: its folder is synced; where folders cannot be opened (not on Unix) the
+/// system decides.
+fn sync_parent(path: &Path) -> io::Result<()> {
+    fault::step()?;
+    #[cfg(unix)]
+    if let Some(parent) = path.parent() {
+        let folder = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
+        File::open(folder)?.sync_all()?;
+    }
+    #[cfg(not(unix))]
+    let _ = path;
+    Ok(())
 }
 
 impl Write for Aside {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.as_file_mut().write(bytes)
+        let file = self.file.as_mut().expect("there until it is finished").as_file_mut();
+        if let Err(error) = fault::step() {
+            // A disk that fills up or loses power takes a part of what is written.
+            let _ = file.write(&bytes[..bytes.len() / 2]);
+            return Err(error);
+        }
+        file.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file.as_file_mut().flush()
+        self.file.as_mut().expect("there until it is finished").as_file_mut().flush()
     }
 }
 
@@ -206,6 +354,16 @@ pub fn write(target: &Path, bytes: &[u8]) -> Result<(), Problems> {
     let mut aside = Aside::beside(target)?;
     aside.write_all(bytes).map_err(|e| write_problem(target, &e))?;
     aside.finish()
+}
+
+/// Writes a whole file aside, syncs and renames it unless a file has the name; whether it was given.
+///
+/// # Errors
+/// As [`write`].
+pub fn write_new(target: &Path, bytes: &[u8]) -> Result<bool, Problems> {
+    let mut aside = Aside::beside(target)?;
+    aside.write_all(bytes).map_err(|e| write_problem(target, &e))?;
+    aside.finish_new()
 }
 
 /// The problem of a file that could not be written.

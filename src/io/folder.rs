@@ -4,7 +4,8 @@
 
 #![expect(clippy::disallowed_methods, reason = "the place where the program touches the disk")]
 
-use super::files::{name, write_problem};
+use super::fault;
+use super::files::{ASIDE, name, write_problem};
 use crate::problem::Problems;
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -80,6 +81,7 @@ fn fill(
             fs::create_dir_all(folder)?;
             folders.push(folder.to_owned());
         }
+        fault::step()?;
         let mut file = File::create_new(&path)?;
         file.write_all(bytes)?;
         file.sync_all()?;
@@ -104,7 +106,7 @@ fn fill(
 
 fn folder_aside(parent: &Path) -> io::Result<tempfile::TempDir> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".aside-");
+    builder.prefix(ASIDE);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

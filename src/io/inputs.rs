@@ -42,6 +42,11 @@ impl Inputs {
         Ok(Self(inputs))
     }
 
+    /// A single text.
+    pub fn of_text(name: &str, text: &str) -> Self {
+        Self(vec![(name.to_owned(), text.as_bytes().to_vec())])
+    }
+
     /// Name and digest of every input.
     pub fn digests(&self) -> Vec<Input> {
         let digest = |(name, bytes): &(String, Vec<u8>)| Input {
@@ -63,6 +68,27 @@ impl Inputs {
         }
         Ok(())
     }
+}
+
+/// Copies the inputs of a run under way into the folder of another.
+///
+/// # Errors
+/// A file that cannot be read or written.
+pub fn copy(from: &Path, to: &Path) -> Result<(), Problems> {
+    let mut folders = vec![PathBuf::from(FOLDER)];
+    while let Some(folder) = folders.pop() {
+        for name in files::names(&from.join(&folder))? {
+            let inside = folder.join(name);
+            if from.join(&inside).is_dir() {
+                folders.push(inside);
+                continue;
+            }
+            let target = to.join(&inside);
+            files::create_parents(&target)?;
+            files::write(&target, &files::read_bytes(&from.join(&inside))?)?;
+        }
+    }
+    Ok(())
 }
 
 /// Reads what a run was made from: the copies in its folder, once all are found to be whole.

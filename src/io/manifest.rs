@@ -6,6 +6,7 @@
 #![expect(clippy::disallowed_methods, reason = "the manifest states when a run was made")]
 
 use super::files;
+use super::maker::Maker;
 use super::schema;
 use super::table::Content;
 use crate::campaign::Outline;
@@ -21,6 +22,8 @@ pub const FILE: &str = "manifest.json";
 /// How a run was carried out; nothing of it changes a table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Execution {
+    /// Program, build and instruction set.
+    pub maker: Maker,
     /// Threads.
     pub jobs: usize,
     /// When the outputs were opened, UTC.
@@ -40,6 +43,7 @@ impl Execution {
     pub fn since(started: SystemTime, jobs: usize) -> Self {
         let now = SystemTime::now();
         Self {
+            maker: Maker::here(),
             jobs,
             started: utc(started),
             finished: utc(now),
@@ -107,7 +111,7 @@ impl Manifest {
 }
 
 /// Date and time in UTC, to the second.
-fn utc(time: SystemTime) -> String {
+pub(super) fn utc(time: SystemTime) -> String {
     let seconds = time.duration_since(UNIX_EPOCH).unwrap_or(Duration::ZERO).as_secs();
     let (mut days, second) = (seconds / 86_400, seconds % 86_400);
     let leap = |year: u64| {

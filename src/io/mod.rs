@@ -1,10 +1,14 @@
 //! Input and output: the only module that touches the disk.
 
+mod assemble;
 pub mod column;
+mod fault;
 pub mod files;
 pub mod flat;
 pub mod folder;
 pub mod inputs;
+pub mod lock;
+pub mod maker;
 pub mod manifest;
 pub mod package;
 pub mod plan;
@@ -14,12 +18,14 @@ pub mod run;
 pub mod scaffold;
 pub mod scenario;
 pub mod schema;
+mod shard;
 pub mod source;
+pub mod store;
 mod stored;
 pub mod summarise;
 #[cfg(test)]
 mod synthetic;
 pub mod table;
 
-pub use results::{Finished, Results};
+pub use results::{Finished, Opening, Results};
 pub use run::Run;

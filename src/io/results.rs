@@ -1,48 +1,37 @@
-//! The results of a run being written: every output is opened first, the manifest comes last.
+//! The results of a run being written: shards while its cases are evaluated, then the tables, the
+//! manifest last.
 //!
-//! What the columns are is said in `schema`; what the records are in `campaign`.
+//! What the columns are is said in `schema`; what the records are in `campaign`; what lies in the
+//! run's folder in `store`.
 
 #![expect(clippy::disallowed_methods, reason = "the manifest states when a run was made")]
 
 use super::column::Column;
 use super::files::{self, Aside};
-use super::inputs;
+use super::inputs::Inputs;
+use super::lock::Told;
 use super::manifest::{self, Execution, Manifest};
 use super::run::Run;
 use super::schema::{self, TableName};
-use super::summarise;
+use super::shard::Filling;
+use super::store::{Access, NEXT, Store, TABLES};
 use super::table::{self, Content, Table};
+use super::{assemble, summarise};
 use crate::campaign::metric::LONGEST_NAME;
-use crate::campaign::row::{self, CaseRow, ModeRow};
 use crate::campaign::summary::{SummaryRow, WorstRow};
 use crate::campaign::{Outline, Record};
 use crate::problem::{Kind, Problems};
-use parquet::errors::ParquetError;
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::SystemTime;
 
 /// The results of a run that is under way.
 ///
-/// Dropped before [`Results::finish`] has succeeded it leaves nothing behind, copies of inputs
-/// included.
+/// Dropped before [`Results::finish`] has succeeded it leaves the shards that are written, from
+/// which the run goes on, and nothing if there are none.
 pub struct Results {
-    // Dropped first, so that the folder is rid of the files written aside when it goes.
-    tables: Tables,
-    folder: Folder,
-}
-
-/// The tables and the manifest being written.
-struct Tables {
-    outline: Outline,
-    cases: Table<CaseRow>,
-    modes: Table<ModeRow>,
-    summary: Table<SummaryRow>,
-    worst: Table<WorstRow>,
-    columns: Table<schema::Described>,
-    manifest: Aside,
-    last: Option<(usize, u64)>,
+    store: Store,
+    filling: Option<Filling>,
     started: SystemTime,
 }
 
@@ -57,151 +46,175 @@ pub struct Finished {
     pub worst: Vec<WorstRow>,
 }
 
+/// How the folder of a run is opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Opening {
+    /// A new folder.
+    New,
+    /// A folder to go on with, or a new one; the number of drawn cases must be the outline's if it
+    /// was asked for.
+    Resume {
+        /// Whether it was asked for.
+        cases: bool,
+    },
+    /// A folder to go on with, with so many more cases in every drawn population.
+    Extend(u64),
+}
+
 impl Results {
-    /// Makes the run's folder and opens every output in it.
+    /// Makes the run's folder, without copies of inputs.
     ///
     /// # Errors
-    /// Input problems: the folder exists, it cannot be written, the disk is full, a draw has a
-    /// column name that readers do not accept or that another has too.
+    /// As [`Results::open`].
     pub fn create(folder: &Path, outline: Outline) -> Result<Self, Problems> {
-        check_names(&outline)?;
-        let started = SystemTime::now();
-        let text = serde_json::to_string(&outline).expect("an outline has text keys only");
-        files::create_folder(folder)?;
-        let folder = Folder { path: folder.to_owned(), keep: false };
-        let path = &folder.path;
-        files::create_folder(&path.join(TABLES))?;
-        let tables = Tables {
-            cases: open(path, TableName::Cases, schema::cases(&outline), &text)?,
-            modes: open(path, TableName::Modes, schema::modes(&outline), &text)?,
-            summary: open(path, TableName::Summary, schema::summary(&outline), &text)?,
-            worst: open(path, TableName::Worst, schema::worst(&outline), &text)?,
-            columns: open(path, TableName::Columns, schema::columns(), &text)?,
-            manifest: Aside::beside(&path.join(manifest::FILE))?,
-            last: None,
-            started,
-            outline,
-        };
-        Ok(Self { tables, folder })
+        Self::open(folder, outline, None, Opening::New, Access::Whole)
     }
 
-    /// Takes the record of the next case; cases come in the order of population and case.
+    /// Opens the folder of a run and locks it.
+    ///
+    /// # Errors
+    /// Input problems: a new folder exists, it cannot be written, the disk is full, another process
+    /// is at work, the run is of another scenario or program; a draw has a column name that readers
+    /// do not accept or that another has too.
+    pub fn open(
+        folder: &Path,
+        outline: Outline,
+        inputs: Option<&Inputs>,
+        opening: Opening,
+        access: Access,
+    ) -> Result<Self, Problems> {
+        check_names(&outline)?;
+        let started = SystemTime::now();
+        let mut store = match opening {
+            Opening::New => Store::begin(folder, outline, inputs, access)?,
+            Opening::Resume { cases } => Store::resume(folder, outline, cases, inputs, access)?,
+            Opening::Extend(_) => Store::resume(folder, outline, false, None, access)?,
+        };
+        if let Opening::Extend(more) = opening {
+            store.extend(more)?;
+        }
+        Ok(Self { store, filling: None, started })
+    }
+
+    /// Goes on with a store that was opened otherwise.
+    pub fn of(store: Store) -> Self {
+        Self { store, filling: None, started: SystemTime::now() }
+    }
+
+    /// The store.
+    pub fn store(&self) -> &Store {
+        &self.store
+    }
+
+    /// Takes the record of the next case; cases come in the order of population and case, gaps are
+    /// allowed.
     ///
     /// # Errors
     /// An input problem if the disk is full or gone.
     pub fn push(&mut self, record: Record) -> Result<(), Problems> {
-        self.tables.push(record, &self.folder.path)
+        if self.filling.as_ref().is_some_and(|filling| !filling.goes_on_with(&record)) {
+            self.checkpoint()?;
+        }
+        let outline = self.store.outline();
+        let filling = match &mut self.filling {
+            Some(filling) => filling,
+            none => {
+                let filling = Filling::new(outline, record.population, record.case)
+                    .map_err(|error| table::problem(self.store.folder(), &error))?;
+                none.insert(filling)
+            }
+        };
+        if filling.push(outline, record) { self.checkpoint() } else { Ok(()) }
     }
 
-    /// Finishes the tables of cases and modes, sums them up, and writes the manifest; `worst` is
-    /// the number of worst cases kept for each population, variant and named mode.
+    /// Writes what was pushed so far to the disk, for good.
     ///
     /// # Errors
-    /// An input problem if the disk is full or gone; then nothing is left behind.
-    ///
-    /// # Panics
-    /// If cases of the outline are missing.
-    pub fn finish(self, jobs: usize, worst: usize) -> Result<Finished, Problems> {
-        let Self { tables, mut folder } = self;
-        let finished = tables.finish(&folder.path, jobs, worst)?;
-        folder.keep = true;
-        Ok(finished)
-    }
-}
-
-impl Tables {
-    fn push(&mut self, record: Record, folder: &Path) -> Result<(), Problems> {
-        let problem = |name: TableName, error: &ParquetError| {
-            table::problem(&folder.join(name.file()), error)
-        };
-        let (population, case) = (record.population, record.case);
-        assert!(self.last < Some((population, case)), "cases come in order");
-        if let Some((before, last)) = self.last {
-            let another = |table: TableName| {
-                let cases = table.group_cases(&self.outline);
-                before != population || last / cases != case / cases
-            };
-            if another(TableName::Cases) {
-                self.cases.end_group().map_err(|e| problem(TableName::Cases, &e))?;
-            }
-            if another(TableName::Modes) {
-                self.modes.end_group().map_err(|e| problem(TableName::Modes, &e))?;
-            }
-        }
-        self.last = Some((population, case));
-        let (case, modes) = row::rows(&self.outline.definition, record);
-        self.cases.push(&case);
-        modes.iter().for_each(|mode| self.modes.push(mode));
+    /// An input problem if the disk is full or gone.
+    pub fn checkpoint(&mut self) -> Result<(), Problems> {
+        let Some(filling) = self.filling.take() else { return Ok(()) };
+        let store = &self.store;
+        let shard = filling.write(store.folder(), store.outline(), store.identity())?;
+        self.store.add(shard);
         Ok(())
     }
 
-    fn finish(self, path: &Path, jobs: usize, worst: usize) -> Result<Finished, Problems> {
-        let Self { outline, cases, modes, started, mut manifest, .. } = self;
+    /// Says to other processes how far the work has come.
+    pub fn tell(&mut self, progress: Told) {
+        self.store.tell(progress);
+    }
+
+    /// Makes the tables of cases from the shards, sums them up, and writes the manifest; `worst` is
+    /// the number of worst cases kept for each population, variant and named mode.
+    ///
+    /// # Errors
+    /// Input: the disk is full or gone; the shards stay. Damage: a shard, by its name.
+    ///
+    /// # Panics
+    /// If cases of the outline are missing.
+    pub fn finish(mut self, jobs: usize, worst: usize) -> Result<Finished, Problems> {
+        self.checkpoint()?;
+        let store = &self.store;
+        assert!(store.missing().is_empty(), "every case was pushed");
+        let next = store.folder().join(NEXT);
+        files::ensure_folder(&next.join(TABLES))?;
         let mut contents = BTreeMap::new();
-        contents.insert(TableName::Cases, close(path, TableName::Cases, cases)?);
-        contents.insert(TableName::Modes, close(path, TableName::Modes, modes)?);
-        assert_eq!(contents[&TableName::Cases].rows, outline.cases(), "every case was pushed");
-        let mut run = Run::of(path, outline, contents);
+        for table in TableName::OF_CASES {
+            contents.insert(table, assemble::assemble(store, table, &next)?);
+        }
+        let mut run = Run::of(&next, store.outline().clone(), contents);
         let rows = summarise::summary(&run, summarise::MEMORY)?;
         let worst_rows = summarise::worst(&run, worst)?;
-        let described = schema::dictionary(run.outline());
-        let summary = fill(path, TableName::Summary, self.summary, &rows)?;
-        let worst = fill(path, TableName::Worst, self.worst, &worst_rows)?;
-        let columns = fill(path, TableName::Columns, self.columns, &described)?;
-        for (name, content) in [
-            (TableName::Summary, summary),
-            (TableName::Worst, worst),
-            (TableName::Columns, columns),
-        ] {
+        let outline = run.outline();
+        let described = schema::dictionary(outline);
+        let write = Writing { folder: store.folder(), next: &next, outline };
+        let made = [
+            write.table(TableName::Summary, schema::summary(outline), &rows)?,
+            write.table(TableName::Worst, schema::worst(outline), &worst_rows)?,
+            write.table(TableName::Columns, schema::columns(), &described)?,
+        ];
+        for (name, content) in made {
             run.insert(name, content);
         }
+        let tables = run.contents().map(|(name, c)| (name.name().to_owned(), c.clone())).collect();
         let text = Manifest {
             schema_version: schema::VERSION,
             run: run.outline().clone(),
-            tables: run.contents().map(|(name, c)| (name.name().to_owned(), c.clone())).collect(),
-            execution: Execution::since(started, jobs),
+            tables,
+            execution: Execution::since(self.started, jobs),
         }
         .to_text();
-        let target = manifest.target().to_owned();
-        manifest
-            .write_all(text.as_bytes())
-            .map_err(|error| files::write_problem(&target, &error))?;
-        manifest.finish()?;
-        Ok(Finished { run, summary: rows, worst: worst_rows })
+        files::write(&next.join(manifest::FILE), text.as_bytes())?;
+        store.commit()?;
+        Ok(Finished { run: run.moved(store.folder()), summary: rows, worst: worst_rows })
     }
 }
 
-/// Folder of the tables inside a run's folder.
-const TABLES: &str = "tables";
-
-/// The run's folder; unless it is to be kept it goes with what a run writes into it, and stays
-/// only if somebody else has put something there.
-struct Folder {
-    path: PathBuf,
-    keep: bool,
+/// Where tables that are made of others are written.
+struct Writing<'a> {
+    folder: &'a Path,
+    next: &'a Path,
+    outline: &'a Outline,
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        if self.keep {
-            return;
-        }
-        files::remove_folder(&self.path.join(TABLES));
-        files::remove_folder(&self.path.join(inputs::FOLDER));
-        files::remove_if_empty(&self.path);
+impl Writing<'_> {
+    fn table<R>(
+        &self,
+        name: TableName,
+        columns: Vec<Column<R>>,
+        rows: &[R],
+    ) -> Result<(TableName, Content), Problems> {
+        let target = self.next.join(name.file());
+        let failed = |error| table::problem(&target, &error);
+        let text = serde_json::to_string(self.outline).expect("an outline has text keys only");
+        // Written aside elsewhere: a folder of tables holds nothing else, whatever happens.
+        let aside = Aside::within(self.folder, &target)?;
+        let mut table = Table::new(columns, &metadata(name, &text), aside).map_err(failed)?;
+        rows.iter().for_each(|row| table.push(row));
+        let (aside, content) = table.close().map_err(failed)?;
+        aside.finish()?;
+        Ok((name, content))
     }
-}
-
-fn open<R>(
-    folder: &Path,
-    name: TableName,
-    columns: Vec<Column<R>>,
-    outline: &str,
-) -> Result<Table<R>, Problems> {
-    let target = folder.join(name.file());
-    // Written aside one level up: a folder of tables holds nothing else, whatever happens.
-    let aside = Aside::within(folder, &target)?;
-    Table::new(columns, &metadata(name, outline), aside).map_err(|e| table::problem(&target, &e))
 }
 
 /// File-level metadata of a table.
@@ -211,23 +224,6 @@ pub(super) fn metadata(name: TableName, outline: &str) -> [(&'static str, String
         ("tvse.table", name.name().to_owned()),
         ("tvse.run", outline.to_owned()),
     ]
-}
-
-fn close<R>(folder: &Path, name: TableName, table: Table<R>) -> Result<Content, Problems> {
-    let (aside, content) =
-        table.close().map_err(|error| table::problem(&folder.join(name.file()), &error))?;
-    aside.finish()?;
-    Ok(content)
-}
-
-fn fill<R>(
-    folder: &Path,
-    name: TableName,
-    mut table: Table<R>,
-    rows: &[R],
-) -> Result<Content, Problems> {
-    rows.iter().for_each(|row| table.push(row));
-    close(folder, name, table)
 }
 
 /// Every column name is plain, short and given once.
@@ -251,14 +247,17 @@ fn check_names(outline: &Outline) -> Result<(), Problems> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic;
+    use super::super::{inputs, synthetic};
     use super::*;
     use crate::campaign::pool::{Pool, spans};
+    use crate::campaign::row;
     use crate::campaign::{StoredPoles, synthetic as cases};
     use arrow::array::{Array, AsArray};
     use arrow::datatypes::{DataType, Float64Type};
     use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder as Reader;
+    use parquet::errors::ParquetError;
     use std::fs::{self, File};
+    use std::io::Write;
     use std::sync::atomic::AtomicBool;
 
     const CASES: [u64; 3] = [1, 1100, 40];
@@ -328,7 +327,8 @@ mod tests {
             expected.push(("corner_dispersed".to_owned(), 0));
             expected
         };
-        assert_eq!(first_cases(TableName::Cases), expected(&[0, 1024]));
+        assert_eq!(TableName::Cases.group_cases(&cases::outline(&CASES, StoredPoles::All)), 8192);
+        assert_eq!(first_cases(TableName::Cases), expected(&[0]));
         assert_eq!(first_cases(TableName::Modes), expected(&[0, 256, 512, 768, 1024]));
     }
 
@@ -389,34 +389,51 @@ mod tests {
     }
 
     #[test]
-    fn an_abandoned_run_leaves_nothing_behind() {
+    fn an_abandoned_run_leaves_its_shards_and_nothing_if_there_are_none() {
         let folder = tempfile::tempdir().unwrap();
         let run = folder.path().join("run");
         let outline = cases::outline(&[1, 3000], StoredPoles::Named);
         let definition = outline.definition.clone();
-        let mut results = Results::create(&run, outline).unwrap();
-        for case in 0..1500 {
-            results.push(cases::record(&definition, 1, case)).unwrap();
+        for (pushed, kept) in [(1500, false), (1500, true)] {
+            let mut results = Results::create(&run, outline.clone()).unwrap();
+            for case in 0..pushed {
+                results.push(cases::record(&definition, 1, case)).unwrap();
+            }
+            files::create_folder(&run.join(inputs::FOLDER).join("runs")).unwrap();
+            if kept {
+                results.checkpoint().unwrap();
+            }
+            drop(results);
+            assert_eq!(run.exists(), kept);
         }
-        files::create_folder(&run.join(inputs::FOLDER).join("runs")).unwrap();
-        files::write(&run.join(inputs::FOLDER).join("runs/a.toml"), b"cases = 3000").unwrap();
-        drop(results);
-        assert!(!run.exists());
+        let results =
+            Results::open(&run, outline, None, Opening::Resume { cases: true }, Access::Whole);
+        let missing = results.unwrap().store().missing();
+        let missing: Vec<_> = missing.into_iter().map(|s| (s.population, s.cases)).collect();
+        assert_eq!(missing, [(0, 0..1), (1, 1500..3000)]);
     }
 
     #[test]
-    fn a_run_that_cannot_be_finished_leaves_nothing_behind() {
+    fn a_run_that_cannot_be_finished_keeps_its_shards_and_can_be_finished_later() {
         let folder = tempfile::tempdir().unwrap();
         let run = folder.path().join("run");
         let outline = cases::outline(&[1], StoredPoles::Named);
         let definition = outline.definition.clone();
-        let mut results = Results::create(&run, outline).unwrap();
+        let mut results = Results::create(&run, outline.clone()).unwrap();
         results.push(cases::record(&definition, 0, 0)).unwrap();
         // A folder stands where the table of worst cases is to go, after others are finished.
-        fs::create_dir_all(run.join(TableName::Worst.file()).join("taken")).unwrap();
+        let taken = run.join(TableName::Worst.file()).join("taken");
+        fs::create_dir_all(&taken).unwrap();
         let problems = results.finish(1, 3).unwrap_err();
         assert!(problems.to_string().contains("worst.parquet"), "{problems}");
-        assert!(!run.exists());
+        fs::remove_dir_all(run.join(TableName::Worst.file())).unwrap();
+        let again = Opening::Resume { cases: true };
+        let results = Results::open(&run, outline.clone(), None, again, Access::Whole).unwrap();
+        assert!(results.store().missing().is_empty());
+        results.finish(1, 3).unwrap();
+        let plain = folder.path().join("plain");
+        synthetic::run(&plain, outline, 1).unwrap();
+        assert_eq!(tables(&run), tables(&plain));
     }
 
     #[test]
@@ -430,7 +447,7 @@ mod tests {
         fs::remove_dir_all(&run).unwrap();
         let problems = results.finish(1, 3).unwrap_err();
         assert_eq!(problems.kind(), Kind::Input);
-        assert!(problems.to_string().contains("cases.parquet"), "{problems}");
+        assert!(problems.to_string().contains("run/"), "{problems}");
     }
 
     #[test]
@@ -467,7 +484,7 @@ mod tests {
     fn a_disk_that_fills_up_ends_the_run_with_a_problem_of_its_file() {
         let outline = cases::outline(&[1, 300], StoredPoles::Named);
         let definition = outline.definition.clone();
-        let written = |room: usize| -> Result<Content, parquet::errors::ParquetError> {
+        let written = |room: usize| -> Result<Content, ParquetError> {
             let metadata = metadata(TableName::Cases, "{}");
             let mut table = Table::new(schema::cases(&outline), &metadata, Small(room))?;
             let result = Pool::new(2).unwrap().run(

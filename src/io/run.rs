@@ -107,6 +107,11 @@ impl Run {
         self.contents.insert(table, content);
     }
 
+    /// The same run in another folder.
+    pub(super) fn moved(self, folder: &Path) -> Self {
+        Self { folder: folder.to_owned(), ..self }
+    }
+
     /// The outline of the run.
     pub fn outline(&self) -> &Outline {
         &self.outline
@@ -147,56 +152,66 @@ impl Run {
         Ok(())
     }
 
-    /// Columns of numbers of the `cases` table for one population, by case index; NaN for NULL.
+    /// Hands the case index and the first failure of every failed case of a population to `visit`.
     ///
     /// # Errors
-    /// Damage in the table.
+    /// Damage in the table, or what `visit` returns.
+    pub fn failures(
+        &self,
+        population: usize,
+        mut visit: impl FnMut(u64, Failure) -> Result<(), Problems>,
+    ) -> Result<(), Problems> {
+        self.cases(population, &[], |case, _, failure| match failure {
+            Some(failure) => visit(case, failure),
+            None => Ok(()),
+        })
+    }
+
+    /// Hands every case of a population to `visit`, in order: its index, its numbers in some
+    /// columns of the `cases` table, NaN for NULL, and its first failure.
+    ///
+    /// # Errors
+    /// Damage in the table, or what `visit` returns.
     ///
     /// # Panics
     /// If a column is not in the registry or holds no numbers.
-    pub fn numbers(&self, population: usize, names: &[&str]) -> Result<Vec<Vec<f64>>, Problems> {
+    pub fn cases(
+        &self,
+        population: usize,
+        names: &[&str],
+        mut visit: impl FnMut(u64, &[f64], Option<Failure>) -> Result<(), Problems>,
+    ) -> Result<(), Problems> {
         let cases = self.outline.definition.populations[population].cases;
-        let mut series: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
-        let chosen = |name: &str| name == "case" || names.contains(&name);
-        let mut reader = self.reader(TableName::Cases, chosen, population, &(0..cases))?;
+        let always = ["case", "status", "failure_message"];
+        let chosen = |name: &str| always.contains(&name) || names.contains(&name);
+        let statuses: Vec<&str> = schema::statuses().collect();
         let mut next = 0;
-        while let Some(batch) = self.next(TableName::Cases, &mut reader)? {
-            self.check_cases(&batch, next)?;
-            next += batch.num_rows() as u64;
-            for (series, name) in series.iter_mut().zip(names) {
-                let column = batch.column_by_name(name).expect("a column of the registry");
-                series.extend(numbers(column).map(|value| value.unwrap_or(f64::NAN)));
+        let mut values = vec![f64::NAN; names.len()];
+        self.batches(TableName::Cases, chosen, population, &(0..cases), |batch| {
+            self.check_cases(batch, next)?;
+            let status = self.words(TableName::Cases, batch, "status", &statuses)?;
+            let message = batch.column_by_name("failure_message").expect("a column");
+            let message = message.as_string::<i32>();
+            let column = |name: &&str| batch.column_by_name(name).expect("of the registry");
+            let mut columns: Vec<_> = names.iter().map(|name| numbers(column(name))).collect();
+            for (row, status) in status.into_iter().enumerate() {
+                for (value, column) in values.iter_mut().zip(&mut columns) {
+                    *value = column.next().flatten().unwrap_or(f64::NAN);
+                }
+                let failure = status.filter(|status| *status > 0).map(|status| {
+                    let said = message.is_valid(row).then(|| message.value(row));
+                    Failure::new(FailureKind::ALL[status - 1], said.unwrap_or_default())
+                });
+                visit(next, &values, failure)?;
+                next += 1;
             }
-        }
+            Ok(())
+        })?;
         if next != cases {
             let allowed = format!("{cases} cases of a population");
             return Err(self.damage(TableName::Cases, next.to_string(), allowed));
         }
-        Ok(series)
-    }
-
-    /// The first failure of every case of a population, by case index.
-    ///
-    /// # Errors
-    /// Damage in the table.
-    pub fn failures(&self, population: usize) -> Result<Vec<Option<Failure>>, Problems> {
-        let cases = self.outline.definition.populations[population].cases;
-        let names = ["case", "status", "failure_message"];
-        let chosen = |name: &str| names.contains(&name);
-        let mut reader = self.reader(TableName::Cases, chosen, population, &(0..cases))?;
-        let statuses: Vec<&str> = schema::statuses().collect();
-        let mut failures = Vec::new();
-        while let Some(batch) = self.next(TableName::Cases, &mut reader)? {
-            self.check_cases(&batch, failures.len() as u64)?;
-            let status = self.words(TableName::Cases, &batch, "status", &statuses)?;
-            let message = batch.column_by_name("failure_message").expect("a column");
-            let message = message.as_string::<i32>();
-            failures.extend(status.iter().zip(message).map(|(status, message)| {
-                let kind = FailureKind::ALL[status.filter(|status| *status > 0)? - 1];
-                Some(Failure::new(kind, message.unwrap_or_default()))
-            }));
-        }
-        Ok(failures)
+        Ok(())
     }
 
     /// The draws of some cases of a population.
@@ -290,7 +305,7 @@ impl Run {
             return Err(self.damage(table, format!("{found} rows"), format!("{rows} rows")));
         }
         let groups = match table {
-            TableName::Cases | TableName::Modes => {
+            _ if TableName::OF_CASES.contains(&table) => {
                 self.groups(table, &self.outline.definition.populations)
             }
             _ => u64::from(rows > 0),
@@ -340,6 +355,25 @@ impl Run {
         decoded(|| builder.build()).map_err(|found| self.damage(table, found, "a Parquet table"))
     }
 
+    /// Hands chosen columns of the row groups that hold some cases of a population to `visit`.
+    ///
+    /// # Errors
+    /// Damage in the table, or what `visit` returns.
+    pub(super) fn batches(
+        &self,
+        table: TableName,
+        chosen: impl Fn(&str) -> bool,
+        population: usize,
+        cases: &Range<u64>,
+        mut visit: impl FnMut(&RecordBatch) -> Result<(), Problems>,
+    ) -> Result<(), Problems> {
+        let mut reader = self.reader(table, chosen, population, cases)?;
+        while let Some(batch) = self.next(table, &mut reader)? {
+            visit(&batch)?;
+        }
+        Ok(())
+    }
+
     fn next(
         &self,
         table: TableName,
@@ -373,7 +407,7 @@ impl Run {
 }
 
 /// What the Parquet reader gives, or what it says of its bytes: on damaged ones it may panic.
-fn decoded<T, E: ToString>(read: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
+pub(super) fn decoded<T, E: ToString>(read: impl FnOnce() -> Result<T, E>) -> Result<T, String> {
     match catch_unwind(AssertUnwindSafe(read)) {
         Ok(result) => result.map_err(|error| error.to_string()),
         Err(_) => Err("bytes that make no sense".to_owned()),

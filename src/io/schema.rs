@@ -16,8 +16,11 @@ use std::sync::Arc;
 /// Version of the tables' columns and metadata; a change of either raises it.
 pub const VERSION: u32 = 1;
 
-/// Cases in a row group of the `cases` table, and the most in one of `modes`.
-const MOST_GROUP_CASES: u64 = 1024;
+/// Most cases in a row group.
+const MOST_GROUP_CASES: u64 = 8192;
+/// Cells of a row group of the `cases` table are kept near this number: few row groups, since the
+/// footer that tells of them is held in memory, and small ones, since each is too.
+const GROUP_CELLS: u64 = 1 << 20;
 /// Rows of a row group of the `modes` table are kept near this number.
 const GROUP_ROWS: u64 = 128 << 10;
 /// Poles of an evaluation reckoned with where all are stored.
@@ -42,6 +45,9 @@ impl TableName {
     /// Every table, in the order of writing.
     pub const ALL: [Self; 5] =
         [Self::Cases, Self::Modes, Self::Summary, Self::Worst, Self::Columns];
+
+    /// The tables that follow the cases, case by case; the others are made from them.
+    pub const OF_CASES: [Self; 2] = [Self::Cases, Self::Modes];
 
     /// The word in file names.
     pub fn name(self) -> &'static str {
@@ -76,10 +82,11 @@ impl TableName {
     /// Cases in a full row group, where the table follows the cases; a power of two, so that
     /// boundaries of all tables and of shards coincide. Fixed by the outline.
     pub fn group_cases(self, outline: &Outline) -> u64 {
-        if self != Self::Modes {
-            return MOST_GROUP_CASES;
-        }
         let definition = &outline.definition;
+        if self != Self::Modes {
+            let columns = (metrics(definition).len() + 2 * outline.draws.len() + 4) as u64;
+            return 1 << (GROUP_CELLS / columns).clamp(1, MOST_GROUP_CASES).ilog2();
+        }
         let poles = match outline.poles {
             StoredPoles::Named => definition.modes.len() as u64,
             StoredPoles::All => ALL_POLES,

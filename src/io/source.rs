@@ -70,15 +70,19 @@ impl Names for Run {
 }
 
 impl Source for Run {
-    fn values(&self, query: &Query<'_>) -> Result<Vec<CaseValue>, Problems> {
+    fn visit(
+        &self,
+        query: &Query<'_>,
+        visit: &mut dyn FnMut(CaseValue) -> Result<(), Problems>,
+    ) -> Result<(), Problems> {
         let populations = &self.outline().definition.populations;
         let population = populations
             .iter()
             .position(|p| p.name == query.population)
             .expect("gates ask for populations of the run");
         match query.metric.table {
-            Table::Cases => of_cases(self, population, query),
-            Table::Modes => of_modes(self, population, query),
+            Table::Cases => of_cases(self, population, query, visit),
+            Table::Modes => of_modes(self, population, query, visit),
         }
     }
 }
@@ -101,18 +105,22 @@ fn of_table<R>(table: Table, columns: &[Column<R>]) -> Vec<Metric> {
         .collect()
 }
 
-fn of_cases(run: &Run, population: usize, query: &Query<'_>) -> Result<Vec<CaseValue>, Problems> {
-    let numbers = run.numbers(population, &[&query.metric.name])?.swap_remove(0);
-    let failures = run.failures(population)?;
-    let values = numbers.into_iter().zip(failures).enumerate().map(|(case, (number, failure))| {
+type Visit<'a> = &'a mut dyn FnMut(CaseValue) -> Result<(), Problems>;
+
+fn of_cases(
+    run: &Run,
+    population: usize,
+    query: &Query<'_>,
+    visit: Visit<'_>,
+) -> Result<(), Problems> {
+    run.cases(population, &[&query.metric.name], |case, values, failure| {
         let row = match failure {
-            _ if !number.is_nan() => Ok(Some(number)),
+            _ if !values[0].is_nan() => Ok(Some(values[0])),
             Some(failure) => Err(failure.to_string()),
             None => Ok(None),
         };
-        CaseValue { case: case as u64, value: reduce([row], query.metric, query.worst) }
-    });
-    Ok(values.collect())
+        visit(CaseValue { case, value: reduce([row], query.metric, query.worst) })
+    })
 }
 
 /// A row of a case: its damping ratio, by which the less stable pole is told, and its value.
@@ -128,7 +136,12 @@ struct Place {
     baseline: Vec<Row>,
 }
 
-fn of_modes(run: &Run, population: usize, query: &Query<'_>) -> Result<Vec<CaseValue>, Problems> {
+fn of_modes(
+    run: &Run,
+    population: usize,
+    query: &Query<'_>,
+    visit: Visit<'_>,
+) -> Result<(), Problems> {
     let definition = &run.outline().definition;
     let columns = schema::modes(run.outline());
     let column = columns.iter().find(|column| column.name == query.metric.name);
@@ -149,20 +162,20 @@ fn of_modes(run: &Run, population: usize, query: &Query<'_>) -> Result<Vec<CaseV
     let width = modes.len();
     places.resize_with(times.len() * width, Place::default);
     let chosen = |index: usize| times[index / width] && modes[index % width];
-    let mut values = Vec::new();
     let mut finish = |case: u64, places: &mut [Place]| {
         let chosen = places.iter().enumerate().filter(|(index, _)| chosen(*index));
         let rows = chosen.flat_map(|(_, place)| place.rows(query));
-        values.push(CaseValue { case, value: reduce(rows, query.metric, query.worst) });
+        let value = reduce(rows, query.metric, query.worst);
         for place in places {
             place.here.clear();
             place.baseline.clear();
         }
+        visit(CaseValue { case, value })
     };
     let mut last = None;
     run.modes(population, 0..u64::MAX, |row| {
         if let Some(last) = last.filter(|last| *last != row.case) {
-            finish(last, &mut places);
+            finish(last, &mut places)?;
         }
         last = Some(row.case);
         let Some(mode) = row.mode else { return Ok(()) };
@@ -175,10 +188,7 @@ fn of_modes(run: &Run, population: usize, query: &Query<'_>) -> Result<Vec<CaseV
         }
         Ok(())
     })?;
-    if let Some(last) = last {
-        finish(last, &mut places);
-    }
-    Ok(values)
+    last.map_or(Ok(()), |last| finish(last, &mut places))
 }
 
 fn value(row: &ModeRow, get: impl Fn(&ModeRow) -> Option<f64>) -> Row {
@@ -267,8 +277,18 @@ mod tests {
         (0..CASES).map(|case| record(case).as_ref().and_then(&value)).collect()
     }
 
+    fn values(run: &Run, query: &Query<'_>) -> Vec<CaseValue> {
+        let mut values = Vec::new();
+        run.visit(query, &mut |value| {
+            values.push(value);
+            Ok(())
+        })
+        .unwrap();
+        values
+    }
+
     fn found(run: &Run, query: &Query<'_>) -> Vec<Option<f64>> {
-        let values = run.values(query).unwrap();
+        let values = values(run, query);
         assert!(values.iter().map(|value| value.case).eq(0..CASES));
         values.into_iter().map(|case| case.value.ok().flatten()).collect()
     }
@@ -322,7 +342,7 @@ mod tests {
                 mode: (!of_cases).then_some("tvse"),
                 ..query(&metric)
             };
-            let values = run.values(&query).unwrap();
+            let values = values(&run, &query);
             let message = |case: usize| values[case].value.clone().unwrap_err();
             assert_eq!(message(11), "draw: booster.left.nozzle.inertia is -1");
             assert_eq!(message(17), "no_convergence: after 90 iterations");

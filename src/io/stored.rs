@@ -13,6 +13,25 @@ use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 use arrow::record_batch::RecordBatch;
 use nalgebra::Complex;
 
+/// The pole of a named mode in a row of the `modes` table; none if the evaluation failed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PoleRow {
+    /// Case index.
+    pub case: u64,
+    /// Index of the variant.
+    pub variant: usize,
+    /// Index of the flight time.
+    pub flight_time: usize,
+    /// Index of the named mode.
+    pub mode: usize,
+    /// The pole, rad/s.
+    pub pole: Option<Complex<f64>>,
+}
+
+/// Columns that [`Run::pole_rows`] reads.
+pub(super) const POLE_COLUMNS: [&str; 6] =
+    ["case", "variant", "flight_time_s", "mode", "pole_re_rad_s", "pole_im_rad_s"];
+
 impl Run {
     /// A column of words by their indices.
     pub(super) fn words(
@@ -38,6 +57,40 @@ impl Run {
             }),
         };
         (0..batch.num_rows()).map(index).collect()
+    }
+
+    /// The poles of a batch of the `modes` table that belong to named modes.
+    pub(super) fn pole_rows(&self, batch: &RecordBatch) -> Result<Vec<PoleRow>, Problems> {
+        let definition = &self.outline().definition;
+        let column = |name: &str| batch.column_by_name(name).expect("a column of the registry");
+        let words = |name: &str, words: &[&str]| self.words(TableName::Modes, batch, name, words);
+        let number = |name: &str| column(name).as_primitive::<Float64Type>();
+        let variants: Vec<&str> = definition.variants.iter().map(|v| v.name.as_str()).collect();
+        let modes: Vec<&str> = definition.modes.iter().map(String::as_str).collect();
+        let (variant, mode) = (words("variant", &variants)?, words("mode", &modes)?);
+        let case = column("case").as_primitive::<Int64Type>();
+        let (re, im) = (number("pole_re_rad_s"), number("pole_im_rad_s"));
+        let time = number("flight_time_s");
+        let times = &definition.flight_times_s;
+        let mut rows = Vec::with_capacity(batch.num_rows());
+        for row in 0..batch.num_rows() {
+            let flight_time = times
+                .iter()
+                .position(|t| time.is_valid(row) && t.to_bits() == time.value(row).to_bits());
+            let (Some(variant), Some(flight_time), true) =
+                (variant[row], flight_time, case.is_valid(row))
+            else {
+                let allowed = "case, variant and time";
+                return Err(self.damage(TableName::Modes, "a row of no evaluation", allowed));
+            };
+            if let Some(mode) = mode[row] {
+                let whole = re.is_valid(row) && im.is_valid(row);
+                let pole = whole.then(|| Complex::new(re.value(row), im.value(row)));
+                let case = case.value(row) as u64;
+                rows.push(PoleRow { case, variant, flight_time, mode, pole });
+            }
+        }
+        Ok(rows)
     }
 
     /// The rows of a batch of the `modes` table, every column read.

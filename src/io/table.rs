@@ -5,13 +5,13 @@
 use super::column::{Buffer, Column};
 use super::files::Aside;
 use crate::problem::Problems;
-use arrow::datatypes::{Schema, SchemaRef};
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use arrow::record_batch::RecordBatch;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::schema::types::ColumnPath;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
@@ -29,14 +29,78 @@ pub struct Content {
     pub blake3: String,
 }
 
+/// A table of record batches, each a row group, written to `W`.
+pub struct Sheet<W: Write + Send = Aside> {
+    schema: SchemaRef,
+    writer: ArrowWriter<Digested<W>>,
+    rows: u64,
+}
+
+impl<W: Write + Send> Sheet<W> {
+    /// A table of these columns with file-level metadata.
+    ///
+    /// # Errors
+    /// What the Parquet writer says.
+    pub fn new(
+        fields: Vec<Field>,
+        metadata: &[(&str, String)],
+        out: W,
+    ) -> Result<Self, ParquetError> {
+        let mut properties = WriterProperties::builder()
+            .set_created_by(concat!("tvse ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_compression(Compression::SNAPPY)
+            .set_dictionary_enabled(false)
+            // Pages have no index: of a long table it would grow with the rows until the end.
+            .set_statistics_enabled(EnabledStatistics::Chunk)
+            .set_offset_index_disabled(true)
+            .set_max_row_group_row_count(None)
+            .set_max_row_group_bytes(None);
+        // Equal values are worth storing once where they are text, not where they are numbers.
+        let repeats = |kind: &DataType| matches!(kind, DataType::Dictionary(..) | DataType::Utf8);
+        for field in fields.iter().filter(|field| repeats(field.data_type())) {
+            let path = ColumnPath::from(field.name().as_str());
+            properties = properties.set_column_dictionary_enabled(path, true);
+        }
+        let pairs = metadata.iter().map(|(k, v)| KeyValue::new((*k).to_owned(), v.clone()));
+        let properties = properties.set_key_value_metadata(Some(pairs.collect())).build();
+        let schema = Arc::new(Schema::new(fields));
+        let out = Digested { out, hasher: blake3::Hasher::new(), bytes: 0 };
+        let writer = ArrowWriter::try_new(out, schema.clone(), Some(properties))?;
+        Ok(Self { schema, writer, rows: 0 })
+    }
+
+    /// The columns.
+    pub fn schema(&self) -> &SchemaRef {
+        &self.schema
+    }
+
+    /// Writes a row group.
+    ///
+    /// # Errors
+    /// What the Parquet writer or the output says.
+    pub fn group(&mut self, rows: &RecordBatch) -> Result<(), ParquetError> {
+        self.writer.write(rows)?;
+        self.rows += rows.num_rows() as u64;
+        self.writer.flush()
+    }
+
+    /// Ends the file and gives back the output with what it holds.
+    ///
+    /// # Errors
+    /// What the Parquet writer or the output says.
+    pub fn close(self) -> Result<(W, Content), ParquetError> {
+        let Digested { out, hasher, bytes } = self.writer.into_inner()?;
+        let blake3 = hasher.finalize().to_hex().to_string();
+        Ok((out, Content { rows: self.rows, bytes, blake3 }))
+    }
+}
+
 /// A table of rows of type `R`, written to `W`.
 pub struct Table<R, W: Write + Send = Aside> {
     columns: Vec<Column<R>>,
     buffers: Vec<Buffer>,
-    schema: SchemaRef,
-    writer: ArrowWriter<Digested<W>>,
+    sheet: Sheet<W>,
     gathered: u64,
-    rows: u64,
 }
 
 impl<R, W: Write + Send> Table<R, W> {
@@ -49,23 +113,9 @@ impl<R, W: Write + Send> Table<R, W> {
         metadata: &[(&str, String)],
         out: W,
     ) -> Result<Self, ParquetError> {
-        let mut properties = WriterProperties::builder()
-            .set_created_by(concat!("tvse ", env!("CARGO_PKG_VERSION")).to_owned())
-            .set_compression(Compression::SNAPPY)
-            .set_dictionary_enabled(false)
-            .set_max_row_group_row_count(None)
-            .set_max_row_group_bytes(None);
-        for column in columns.iter().filter(|column| column.repeats()) {
-            let path = ColumnPath::from(column.name.as_str());
-            properties = properties.set_column_dictionary_enabled(path, true);
-        }
-        let pairs = metadata.iter().map(|(k, v)| KeyValue::new((*k).to_owned(), v.clone()));
-        let properties = properties.set_key_value_metadata(Some(pairs.collect())).build();
-        let schema = Arc::new(Schema::new(columns.iter().map(Column::field).collect::<Vec<_>>()));
-        let out = Digested { out, hasher: blake3::Hasher::new(), bytes: 0 };
-        let writer = ArrowWriter::try_new(out, schema.clone(), Some(properties))?;
+        let sheet = Sheet::new(columns.iter().map(Column::field).collect(), metadata, out)?;
         let buffers = columns.iter().map(Buffer::new).collect();
-        Ok(Self { columns, buffers, schema, writer, gathered: 0, rows: 0 })
+        Ok(Self { columns, buffers, sheet, gathered: 0 })
     }
 
     /// Adds a row.
@@ -74,6 +124,11 @@ impl<R, W: Write + Send> Table<R, W> {
             buffer.push(column, row);
         }
         self.gathered += 1;
+    }
+
+    /// Rows gathered for the row group under way.
+    pub fn gathered(&self) -> u64 {
+        self.gathered
     }
 
     /// Ends the row group, if it has rows, and writes it.
@@ -85,10 +140,8 @@ impl<R, W: Write + Send> Table<R, W> {
             return Ok(());
         }
         let arrays = self.buffers.iter_mut().zip(&self.columns).map(|(b, c)| b.finish(c)).collect();
-        self.writer.write(&RecordBatch::try_new(self.schema.clone(), arrays)?)?;
-        self.rows += self.gathered;
         self.gathered = 0;
-        self.writer.flush()
+        self.sheet.group(&RecordBatch::try_new(self.sheet.schema().clone(), arrays)?)
     }
 
     /// Ends the file and gives back the output with what it holds.
@@ -97,9 +150,7 @@ impl<R, W: Write + Send> Table<R, W> {
     /// What the Parquet writer or the output says.
     pub fn close(mut self) -> Result<(W, Content), ParquetError> {
         self.end_group()?;
-        let Digested { out, hasher, bytes } = self.writer.into_inner()?;
-        let blake3 = hasher.finalize().to_hex().to_string();
-        Ok((out, Content { rows: self.rows, bytes, blake3 }))
+        self.sheet.close()
     }
 }
 

@@ -402,17 +402,18 @@ impl Solver {
     /// Relative residual of the vectors found, see [`Pair::residual`].
     fn residual(&self, model: &Model, s: c64) -> f64 {
         let n = model.coordinates();
-        let mut rows = vec![c64::new(0.0, 0.0); n];
-        let mut columns = vec![c64::new(0.0, 0.0); n];
+        let (right, left) = (self.vectors.col(0), self.vectors.col(1));
         let (square, modulus) = (s * s, s.norm());
+        let mut rows = vec![c64::new(0.0, 0.0); n];
+        let mut columns = rows.clone();
         let mut sums = [0.0_f64; 3];
-        for column in 0..n {
-            for row in 0..n {
+        for (column, to_column) in columns.iter_mut().enumerate() {
+            for (row, to_row) in rows.iter_mut().enumerate() {
                 let (at, scale) = ((row, column), self.scale[row] * self.scale[column]);
                 let [m, d, k] = [model.mass[at], model.damping[at], model.stiffness[at]];
                 let entry = (square * m + s * d + k) * scale;
-                rows[row] += entry * self.vectors[(column, 0)];
-                columns[column] += self.vectors[(row, 1)].conj() * entry;
+                *to_row += entry * right[column];
+                *to_column += left[row].conj() * entry;
                 for (sum, value) in sums.iter_mut().zip([m, d, k]) {
                     *sum += (value * scale).powi(2);
                 }

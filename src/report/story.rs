@@ -157,19 +157,19 @@ fn worst_case(outline: &Outline, rows: &[&WorstRow]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::campaign::summary::{Series, groups, summarise};
+    use crate::campaign::summary::{Found, groups, summarise};
     use crate::campaign::{StoredPoles, synthetic};
 
     fn summary(outline: &Outline) -> Vec<SummaryRow> {
         let mut rows = Vec::new();
         for (population, p) in outline.definition.populations.iter().enumerate() {
             for group in groups(&outline.definition, population) {
-                let mut series = Series::unknown(p.cases as usize);
-                for case in 1..p.cases as usize {
+                let mut cases = vec![Found::NOTHING; p.cases as usize];
+                for (case, found) in cases.iter_mut().enumerate().skip(1) {
                     let damping = 0.001 * case as f64 - 0.0025;
-                    series.add(case, damping, 5.0, -30.0 * damping);
+                    found.add(damping, 5.0, -30.0 * damping);
                 }
-                rows.push(summarise(group, p.drawn, &series).unwrap());
+                rows.push(summarise(group, p.drawn, &cases).unwrap());
             }
         }
         rows

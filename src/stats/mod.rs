@@ -16,6 +16,7 @@ mod probability;
 mod proportion;
 mod quantile;
 mod root;
+mod selection;
 mod student;
 mod tolerance;
 
@@ -24,11 +25,12 @@ pub use convergence::{checkpoints, running};
 pub use drawing::{Drawing, Independent};
 pub use error::Error;
 pub use estimate::{Estimate, Method, Sides};
-pub use moments::Moments;
+pub use moments::{Moments, RunningMoments};
 pub use paired::PairedDifference;
 pub use probability::{Confidence, Probability};
 pub use proportion::{clopper_pearson, rejects_at_least, rejects_at_most};
-pub use quantile::Ordered;
+pub use quantile::{Ordered, quantile_of};
+pub use selection::Selection;
 pub use tolerance::{
     Tails, ToleranceBound, ToleranceInterval, consumers_risk, least_cases, most_exceedances,
     tolerance_bound, tolerance_interval,

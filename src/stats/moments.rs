@@ -120,6 +120,40 @@ impl Moments {
     }
 }
 
+/// Moments of values that come one by one; the same as [`Moments::of`] of all of them.
+#[derive(Debug, Clone, Default)]
+pub struct RunningMoments {
+    whole: Moments,
+    chunk: Vec<f64>,
+}
+
+impl RunningMoments {
+    /// Takes a value.
+    ///
+    /// # Errors
+    /// A value that is not finite.
+    pub fn push(&mut self, value: f64) -> Result<(), Error> {
+        if !value.is_finite() {
+            let index = self.whole.count() as usize + self.chunk.len();
+            return Err(Error::NotFinite { index, found: value, allowed: "finite" });
+        }
+        self.chunk.push(value);
+        if self.chunk.len() == CHUNK {
+            self.whole = self.moments();
+            self.chunk.clear();
+        }
+        Ok(())
+    }
+
+    /// Moments of the values so far.
+    pub fn moments(&self) -> Moments {
+        if self.chunk.is_empty() {
+            return self.whole;
+        }
+        self.whole.merge(Moments::of_chunk(&self.chunk))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,6 +174,19 @@ mod tests {
         let kurtosis = 0.6 * (3.0 * n * n - 7.0) / (n * n - 1.0);
         assert!((moments.kurtosis().unwrap() / kurtosis - 1.0).abs() < tolerance);
         assert!(moments.skewness().unwrap().abs() < tolerance);
+    }
+
+    #[test]
+    fn values_that_come_one_by_one_give_the_same_bits() {
+        let values: Vec<f64> = (0..2500).map(|i| (f64::from(i) * 0.7).sin()).collect();
+        let mut running = RunningMoments::default();
+        for (count, value) in (1..).zip(&values) {
+            running.push(*value).unwrap();
+            if [1, 1023, 1024, 1025, 2048, 2500].contains(&count) {
+                assert_eq!(running.moments(), Moments::of(&values[..count]).unwrap());
+            }
+        }
+        assert!(running.push(f64::NAN).is_err());
     }
 
     #[test]

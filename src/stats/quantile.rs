@@ -53,16 +53,8 @@ impl Ordered {
     }
 
     pub(super) fn quantile_at(&self, level: f64) -> f64 {
-        let position = (self.0.len() - 1) as f64 * level;
-        let index = position.floor() as usize;
-        let weight = position - position.floor();
-        let below = self.0[index];
-        let above = self.0[(index + 1).min(self.0.len() - 1)];
-        if weight == 0.0 || below == above || below.is_infinite() {
-            below
-        } else {
-            below + weight * (above - below)
-        }
+        let (ranks, weight) = ranks_of(self.0.len() as u64, level);
+        between(ranks.map(|rank| self.0[rank as usize]), weight)
     }
 
     /// Quantile with the distribution-free interval between order statistics.
@@ -90,6 +82,28 @@ impl Ordered {
             .map_or(f64::INFINITY, |skip| self.0[(cases - 1 - skip) as usize]);
         let point = self.quantile(level);
         Estimate::new(point, (lower, upper), sides, confidence, Method::OrderStatistics)
+    }
+}
+
+/// Quantile of type 7 of `count` values, at least one, of which `value` gives those at the ranks
+/// (from 0) that are asked for: see [`Ordered::quantile`].
+pub fn quantile_of(count: u64, level: Probability, value: impl FnMut(u64) -> f64) -> f64 {
+    let (ranks, weight) = ranks_of(count, level.get());
+    between(ranks.map(value), weight)
+}
+
+/// The two ranks between which a quantile lies, and the weight of the second.
+fn ranks_of(count: u64, level: f64) -> ([u64; 2], f64) {
+    let position = (count - 1) as f64 * level;
+    let rank = position.floor() as u64;
+    ([rank, (rank + 1).min(count - 1)], position - position.floor())
+}
+
+fn between([below, above]: [f64; 2], weight: f64) -> f64 {
+    if weight == 0.0 || below == above || below.is_infinite() {
+        below
+    } else {
+        below + weight * (above - below)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Verdicts of gates on planted cases.
 
 use super::super::outcome::Report;
-use super::super::source::{Population, Table};
+use super::super::source::{Metric, Population, Table};
 use super::*;
 use crate::gate::parse;
 use crate::problem::Kind;
@@ -65,10 +65,14 @@ impl Names for Planted {
 }
 
 impl Source for Planted {
-    fn values(&self, query: &Query<'_>) -> Result<Vec<CaseValue>, Problems> {
+    fn visit(
+        &self,
+        query: &Query<'_>,
+        visit: &mut dyn FnMut(CaseValue) -> Result<(), Problems>,
+    ) -> Result<(), Problems> {
         let take = if query.population == "nominal" { 1 } else { self.values.len() };
         let values = self.values.iter().take(take).cloned();
-        Ok((0..).zip(values).map(|(case, value)| CaseValue { case, value }).collect())
+        (0..).zip(values).try_for_each(|(case, value)| visit(CaseValue { case, value }))
     }
 }
 
