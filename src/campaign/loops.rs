@@ -118,7 +118,9 @@ impl OpenLoop {
             response.at(s, &mut sensed);
             match law.response(autopilot, &drawn.autopilot, s) {
                 Some(feedback) => Matrix3::from_fn(|row, column| {
-                    self.sign * feedback.row(row).tr_dot(&sensed.column(column).transpose())
+                    let products = (0..rows.len())
+                        .map(|signal| feedback[(row, signal)] * sensed[(signal, column)]);
+                    self.sign * products.sum::<Complex<f64>>()
                 }),
                 // At a pole of a filter.
                 None => Matrix3::from_element(Complex::new(f64::NAN, f64::NAN)),
@@ -163,8 +165,9 @@ fn motion_of(
     pole: Complex<f64>,
 ) -> String {
     let reference = Reference::new(model, solver.pair(model, pole));
-    let shares =
-        motions.iter().map(|(name, members)| (name, reference.participation(members.iter().copied())));
+    let shares = motions
+        .iter()
+        .map(|(name, members)| (name, reference.participation(members.iter().copied())));
     shares.max_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(String::new(), |(name, _)| name.clone())
 }
 

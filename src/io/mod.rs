@@ -2,6 +2,7 @@
 
 mod assemble;
 pub mod column;
+mod envelope;
 mod fault;
 pub mod files;
 pub mod flat;

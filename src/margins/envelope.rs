@@ -36,6 +36,27 @@ pub fn spread(values: &[f64]) -> Result<Option<Spread>, Error> {
     Ok(Some(Spread { smallest: ordered.smallest(), quantiles, largest: ordered.largest() }))
 }
 
+/// One row of the `envelopes` table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnvelopeRow {
+    /// Index of the population.
+    pub population: usize,
+    /// Index of the variant.
+    pub variant: usize,
+    /// Index of the flight time.
+    pub flight_time: usize,
+    /// Index of the axis.
+    pub axis: usize,
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Cases with a curve.
+    pub cases: u64,
+    /// Spread of the magnitude, dB; none without a curve that is not zero.
+    pub magnitude_db: Option<Spread>,
+    /// Spread of the phase, degrees, each case's next to the nominal one's.
+    pub phase_deg: Option<Spread>,
+}
+
 /// The phase nearest to `reference`, degrees, among those that differ from `phase` by whole turns.
 ///
 /// Curves unwrapped from low frequency can differ by a turn past a zero near the imaginary axis that

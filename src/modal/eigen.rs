@@ -226,13 +226,12 @@ impl Solver {
             Par::Seq,
             MemStack::new(&mut self.memory),
         );
-        let b = DMatrix::from_fn(self.kept.len(), inputs.ncols(), |row, input| {
-            match self.kept[row] {
+        let b =
+            DMatrix::from_fn(self.kept.len(), inputs.ncols(), |row, input| match self.kept[row] {
                 state if state < n => 0.0,
                 state if state < 2 * n => accelerations[(state - n, input)],
                 state => inputs[(state - n, input)],
-            }
-        });
+            });
         let mut c = DMatrix::zeros(rows.len(), self.kept.len());
         for (output, row) in rows.iter().enumerate() {
             for &(coordinate, factor) in &row.entries {
