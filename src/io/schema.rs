@@ -637,8 +637,9 @@ pub fn loop_modes(outline: &Outline) -> Vec<Column<LoopRow<Option<NamedPeak>>>> 
         }),
         Column::word(
             "stabilised",
-            "gain: the peak is below minus the gain margin; phase: where it is not, the loop is at \
-             least the phase margin away from -180 degrees and the closed loop stable; neither",
+            "gain: the peak is below minus the gain margin; phase: the closed loop is stable, and about the \
+             peak the loop is at least the phase margin away from -180 degrees wherever it is within the \
+             gain margin of 0 dB; neither",
             STABILISED.map(Stabilised::name),
             |r: &LoopRow<Option<NamedPeak>>| {
                 let how = r.fact.as_ref()?.peak.stabilised;

@@ -24,8 +24,9 @@ const SEARCHED_DB: f64 = -40.0;
 pub enum Stabilised {
     /// |L| stays below minus the gain margin in the whole window of the mode.
     Gain,
-    /// Wherever in the window |L| is higher, L is at least the phase margin away from −180°, and the closed
-    /// loop is stable.
+    /// The closed loop is stable, and in the lobe of the mode, the frequencies about its peak at which |L|
+    /// is above minus the gain margin, L is at least the phase margin away from −180° wherever |L| is
+    /// within the gain margin of 0 dB. (An unstable mode must cross −180° above.)
     Phase,
     /// Neither.
     Neither,
@@ -110,13 +111,9 @@ fn peak(
         highest = at(place)?;
     }
     let l = highest.broken[axis];
-    let level = |l: Complex<f64>| decibels(l) + settings.gain_margin_db;
-    let stabilised = if level(l) < 0.0 {
+    let stabilised = if decibels(l) < -settings.gain_margin_db {
         Stabilised::Gain
-    } else if stable && is_away(l, settings.phase_margin_deg) && {
-        let samples = &curve.samples[window];
-        phase_stabilised(samples, axis, level, settings.phase_margin_deg, at)?
-    } {
+    } else if stable && keeps_away(&curve.samples, top, axis, settings, at)? {
         Stabilised::Phase
     } else {
         Stabilised::Neither
@@ -131,29 +128,36 @@ fn peak(
     }))
 }
 
-/// Whether a loop keeps away from −180° wherever in the window its `level` is above zero: at the
-/// samples, and where it crosses zero between them.
-fn phase_stabilised(
+/// Whether a loop keeps its phase margin in the lobe around the sample `top`: at the samples whose gain
+/// is within the gain margin of 0 dB, and where it enters and leaves that band between them.
+fn keeps_away(
     samples: &[Sample],
+    top: usize,
     axis: usize,
-    level: impl Fn(Complex<f64>) -> f64,
-    margin_deg: f64,
+    settings: &Settings,
     at: &mut impl FnMut(f64) -> Result<Sample, Error>,
 ) -> Result<bool, Error> {
+    let gain = |sample: &Sample| decibels(sample.broken[axis]);
+    let most = settings.gain_margin_db;
     let safe = |sample: &Sample| {
-        let l = sample.broken[axis];
-        level(l) < 0.0 || is_away(l, margin_deg)
+        gain(sample).abs() > most || is_away(sample.broken[axis], settings.phase_margin_deg)
     };
-    if !samples.iter().all(safe) {
+    let up = samples[top..].iter().take_while(|sample| gain(sample) >= -most).count();
+    let down = samples[..top].iter().rev().take_while(|sample| gain(sample) >= -most).count();
+    // With the neighbours outside, where there are any.
+    let lobe = &samples[(top - down).saturating_sub(1)..(top + up + 1).min(samples.len())];
+    if !lobe.iter().all(safe) {
         return Ok(false);
     }
-    for pair in samples.windows(2) {
-        let ends = [&pair[0], &pair[1]].map(|sample| level(sample.broken[axis]));
-        if (ends[0] < 0.0) != (ends[1] < 0.0) {
-            let between = [pair[0].place, pair[1].place];
-            let place = search::zero(between, ends, CROSSING, |t| Ok(level(at(t)?.broken[axis])))?;
-            if !is_away(at(place)?.broken[axis], margin_deg) {
-                return Ok(false);
+    for pair in lobe.windows(2).filter(|pair| pair[0].place >= 1.0) {
+        for level in [-most, most] {
+            let ends = [gain(&pair[0]) - level, gain(&pair[1]) - level];
+            if (ends[0] < 0.0) != (ends[1] < 0.0) {
+                let between = [pair[0].place, pair[1].place];
+                let place = search::zero(between, ends, CROSSING, |t| Ok(gain(&at(t)?) - level))?;
+                if !is_away(at(place)?.broken[axis], settings.phase_margin_deg) {
+                    return Ok(false);
+                }
             }
         }
     }
@@ -202,5 +206,24 @@ mod tests {
         assert_eq!(found(0.9, 180.0).stabilised, Stabilised::Neither);
         // Unstable.
         assert_eq!(found(1.1, 180.0).stabilised, Stabilised::Neither);
+    }
+
+    #[test]
+    fn an_unstable_mode_is_phase_stabilised_where_it_crosses_with_gain_to_spare() {
+        // Negative damping: its circle stands on the left, and feedback of 2.5 times adds more.
+        let unstable = |gain: f64| {
+            let g = move |s: Complex<f64>| {
+                let damping = 2.0 * ZETA * OMEGA * s;
+                let mode = damping / (s * s - damping + OMEGA * OMEGA);
+                let zero = Complex::default();
+                Matrix3::from_diagonal(&Vector3::new(gain * mode, zero, zero))
+            };
+            let pole = Complex::new(ZETA * OMEGA, OMEGA * (1.0 - ZETA * ZETA).sqrt());
+            let found = assess(g, &[pole], &[], &[], &Settings::default()).expect("scanned");
+            (found.unstable, found.peaks[0].stabilised)
+        };
+        assert_eq!(unstable(0.9), (2, Stabilised::Neither));
+        assert_eq!(unstable(1.1), (0, Stabilised::Neither));
+        assert_eq!(unstable(2.5), (0, Stabilised::Phase));
     }
 }
