@@ -51,6 +51,8 @@ fn definition(vehicle: &Vehicle) -> Definition {
             rigid_body: false,
             slosh: false,
             aerodynamics: false,
+            feedback: tvse::dynamics::servo::Feedback::Open,
+            actuators: None,
         }],
         modes: vec!["tvse".to_owned()],
         gimballed: vehicle.engines.iter().map(|e| e.group == "booster").collect(),

@@ -57,11 +57,11 @@ impl Level {
             Self::Vehicle => true,
             Self::Engine => matches!(scope, Scope::Engine | Scope::Actuator | Scope::Gimbal),
             Self::Actuator => scope == Scope::Actuator,
+            Self::Tank => scope == Scope::Tank,
             Self::Mode => matches!(scope, Scope::Mode | Scope::Gimbal | Scope::SensorMode),
             Self::Sensor => matches!(scope, Scope::Sensor | Scope::SensorMode),
             Self::Path => matches!(scope, Scope::Path | Scope::Filter),
             Self::Filter => scope == Scope::Filter,
-            Self::Tank => scope == Scope::Tank,
         }
     }
 
@@ -289,9 +289,10 @@ fn alternatives(path: &str, vehicle: &Vehicle, parameters: &Parameters) -> Strin
     let mut candidates: BTreeSet<String> =
         parameters.all().iter().filter(|p| p.exists).map(|p| p.path.clone()).collect();
     for definition in Quantity::ALL.iter().map(|q| q.definition()) {
-        let wild = ["<engine>", "<actuator>", "<label>", "<sensor>", "<path>", "<filter>"]
-            .iter()
-            .fold(definition.path.to_string(), |path, segment| path.replace(segment, "*"));
+        let wild =
+            ["<engine>", "<actuator>", "<label>", "<sensor>", "<path>", "<filter>", "<tank>"]
+                .iter()
+                .fold(definition.path.to_string(), |path, segment| path.replace(segment, "*"));
         candidates.extend(groups.iter().map(|group| wild.replace("<group>", group)));
     }
     let mut near = Vec::new();
@@ -303,7 +304,11 @@ fn alternatives(path: &str, vehicle: &Vehicle, parameters: &Parameters) -> Strin
         let next = next.to_string();
         candidates.remove(&next);
     }
-    let templates: Vec<&str> = Quantity::ALL.iter().map(|q| q.definition().path).collect();
+    let held = |quantity: &Quantity| {
+        parameters.all().iter().any(|parameter| parameter.exists && parameter.quantity == *quantity)
+    };
+    let templates: Vec<&str> =
+        Quantity::ALL.iter().filter(|q| held(q)).map(|q| q.definition().path).collect();
     let asked = match near.as_slice() {
         [] => String::new(),
         near => format!("did you mean {}? ", near.join(" or ")),

@@ -417,8 +417,8 @@ impl Drop for Store {
         if self.access == Access::Whole {
             files::remove_folder(&self.folder.join(NEXT).join(TABLES));
             files::remove_folder(&self.folder.join(NEXT));
-            if self.tables.is_none() && self.shards.is_empty() {
-                files::remove_if_empty(&self.folder.join(shard::FOLDER));
+            let none = files::names(&self.folder.join(shard::FOLDER)).is_ok_and(|n| n.is_empty());
+            if self.tables.is_none() && self.shards.is_empty() && none {
                 remove_unstarted(&self.folder);
             }
         }

@@ -35,6 +35,11 @@ pub fn modal() -> Modal {
         points.push((format!("core.{}.rock", i + 1), [94.0, *y, z + 0.76 * z.signum()]));
         points.push((format!("core.{}.tilt", i + 1), [94.0, y + 0.76 * y.signum(), *z]));
     }
+    points.push(("tank.lox".into(), [42.1, 0.0, 0.0]));
+    points.push(("tank.lh2".into(), [65.4, 0.0, 0.0]));
+    for (name, x) in [("core.aft", 93.0), ("intertank", 56.0), ("upper", 20.0)] {
+        points.push((format!("gyro.{name}"), [x, 0.0, 0.0]));
+    }
     let grids: Vec<Grid> = points
         .into_iter()
         .map(|(name, at)| Grid {

@@ -7,8 +7,13 @@ use tvse::io::Run;
 /// Kind and message of the failures of the dispersed population.
 fn failures(study: &Study) -> Vec<Option<(&'static str, String)>> {
     let run = Run::open(&study.path("result")).unwrap();
-    let failures = run.failures(1).unwrap().into_iter();
-    failures.map(|failure| failure.map(|f| (f.kind.name(), f.message))).collect()
+    let mut failures = Vec::new();
+    run.cases(1, &[], |_, _, failure| {
+        failures.push(failure.map(|f| (f.kind.name(), f.message)));
+        Ok(())
+    })
+    .unwrap();
+    failures
 }
 
 fn nothing_is_nan(study: &Study) {

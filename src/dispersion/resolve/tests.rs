@@ -284,7 +284,7 @@ fn a_nozzle_without_a_liner_has_no_ablation() {
     vehicle.engines[0].nozzle.ablation = None;
     assert_eq!(keys(&good(&text, &vehicle)), ["booster.right.nozzle.ablation @ engine"]);
     vehicle.engines[1].nozzle.ablation = None;
-    one_problem_of(&text, &vehicle, "row[0].path", "no engine has", "liner ablation");
+    one_problem_of(&text, &vehicle, "row[0].path", "no part has", "liner ablation");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::*;
 use crate::dynamics::DrawnBody;
 use crate::dynamics::attached::rigid_motion;
-use crate::dynamics::{DrawnEngine, DrawnTank};
+use crate::dynamics::{DrawnActuator, DrawnEngine, DrawnTank};
 use nalgebra::{DMatrix, Matrix3, Matrix3x2, Matrix3xX};
 
 /// Three modes and one canted engine, with no symmetry to hide a mistake.
@@ -547,6 +547,7 @@ fn rigid_with_slosh(slosh_x_m: f64) -> (Plant, DrawnVehicle) {
         slope,
         case_per_flow: Vec::new(),
         in_modes: true,
+        actuators: 0,
     };
     let (shape, slope) = rigid_motion(&Vector3::new(slosh_x_m, 0.0, 0.0)).into_iter().unzip();
     plant.tanks = vec![TankAttachment {

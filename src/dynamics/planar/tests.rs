@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::dynamics::{
-    Attachment, DrawnBody, DrawnEngine, DrawnVehicle, Effects, Layout, Model, Plant,
+    Attachment, DrawnActuator, DrawnBody, DrawnEngine, DrawnVehicle, Effects, Layout, Model, Plant,
 };
 use crate::vehicle::MassProperties;
 use nalgebra::{Matrix3, Matrix3x2, Vector3};

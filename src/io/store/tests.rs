@@ -25,6 +25,12 @@ fn plain() -> (TempDir, Vec<Vec<u8>>) {
     (folder, tables)
 }
 
+/// A folder on a file system that syncs at once, where there is one.
+fn in_memory() -> TempDir {
+    let memory = tempfile::tempdir_in("/dev/shm");
+    memory.unwrap_or_else(|_| tempfile::tempdir().unwrap())
+}
+
 fn tables(run: &Path) -> Vec<Vec<u8>> {
     let tables = TableName::of_run(&outline());
     tables.iter().map(|table| fs::read(run.join(table.file())).unwrap()).collect()
@@ -66,7 +72,7 @@ fn a_run_that_was_stopped_goes_on_and_has_the_bytes_of_one_that_was_not() {
 
 #[test]
 fn any_fault_at_any_step_leaves_a_run_that_goes_on_to_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = in_memory();
     let outline = || cases::outline(&[1, 70, 20], StoredPoles::All);
     let counted = folder.path().join("counted");
     fault::inject(None);
@@ -256,7 +262,7 @@ fn a_changed_scenario_is_refused_by_the_name_of_what_changed() {
         let mut changed = outline();
         change(&mut changed);
         let refused = Results::open(&run, changed, None, again, Access::Whole);
-        let problems = refused.err().unwrap();
+        let problems = refused.err().expect(name);
         assert_eq!((problems.kind(), problems.0.len()), (Kind::Input, 1), "{problems}");
         assert_eq!(problems.0[0].key, name);
     }
@@ -336,7 +342,7 @@ fn an_extended_run_has_the_bytes_of_one_that_was_longer_from_the_start() {
 
 #[test]
 fn any_fault_while_a_run_is_extended_leaves_one_that_goes_on() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = in_memory();
     let long = folder.path().join("long");
     synthetic::run(&long, cases::outline(&[1, 90, 60], StoredPoles::All), 2).unwrap();
     let expected = tables(&long);
