@@ -21,6 +21,7 @@ pub mod plan;
 pub mod planar;
 pub mod progress;
 pub mod replay;
+pub mod response;
 pub mod retry;
 pub mod run;
 pub mod schema;
@@ -67,6 +68,7 @@ enum Command {
     Summary(summary::Args),
     Gate(gate::Args),
     Replay(replay::Args),
+    Response(response::Args),
     HowMany(how_many::Args),
     Planar(planar::Args),
     Margins(margins::Args),
@@ -125,6 +127,7 @@ pub fn run() -> ExitCode {
         Command::Summary(args) => summary::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
+        Command::Response(args) => response::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),
         Command::Margins(args) => margins::run(args, &mut out),

@@ -14,6 +14,7 @@ pub mod manifest;
 pub mod package;
 pub mod plan;
 pub mod replay;
+pub mod response;
 pub mod results;
 pub mod run;
 pub mod scaffold;

@@ -1,6 +1,6 @@
 //! The eigen-solver: poles of a model by a dense solve, eigenvectors by inverse iteration.
 //!
-//! The only file that names faer's solvers. Mass matrix by Cholesky, Parlett–Reinsch balancing,
+//! With `response` the only file that names faer's solvers. Mass matrix by Cholesky, Parlett–Reinsch balancing,
 //! Hessenberg QR, all sequential and in buffers that are reused; what poles mean is decided in
 //! `identify`.
 
