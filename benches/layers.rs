@@ -35,6 +35,7 @@ fn definition(vehicle: &Vehicle) -> Definition {
         cases,
         fixed: Vec::new(),
         drawn,
+        scheme: Default::default(),
     };
     Definition {
         name: "bench".to_owned(),

@@ -67,16 +67,23 @@ pub struct LoopRow<T> {
 /// Margins of an axis and the closed loop's unstable poles, or why there are none.
 pub type Margins = Result<(AxisMargins, i64), Failure>;
 
+/// A row of `margins`.
+pub type MarginRow = LoopRow<Margins>;
+/// A row of `loop_modes`: a resonance, none where the axis has none.
+pub type PeakRow = LoopRow<Option<NamedPeak>>;
+/// A row of `loop_curves`: index of a frequency and the loop there, none where the evaluation failed.
+pub type CurveRow = LoopRow<Option<(usize, CurvePoint)>>;
+
 /// The rows of a record in the tables of loops.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LoopRows {
     /// `margins`: every axis of every assessed evaluation.
-    pub margins: Vec<LoopRow<Margins>>,
+    pub margins: Vec<MarginRow>,
     /// `loop_modes`: resonances by axis; one row without where there is none.
-    pub peaks: Vec<LoopRow<Option<NamedPeak>>>,
+    pub peaks: Vec<PeakRow>,
     /// `loop_curves`: by axis the index of a frequency and the loop there; one row without where the
     /// evaluation failed.
-    pub curves: Vec<LoopRow<Option<(usize, CurvePoint)>>>,
+    pub curves: Vec<CurveRow>,
 }
 
 /// Every item, or `None` once where there are none.

@@ -4,12 +4,14 @@
 //! decided in `column` and `table`.
 
 use super::column::Column;
+use crate::campaign::Population;
 use crate::campaign::loop_metric::loop_metrics;
-use crate::campaign::loops::{CurvePoint, NamedPeak};
 use crate::campaign::metric::metrics;
+use crate::campaign::nested::Statement;
 use crate::campaign::outline::{Outline, StoredPoles};
 use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
-use crate::campaign::row::{CaseRow, LoopRow, Margins, ModeRow};
+use crate::campaign::row::{CaseRow, CurveRow, LoopRow, MarginRow, ModeRow, PeakRow};
+use crate::campaign::sample::Intervals;
 use crate::campaign::summary::{LEVELS, Spread, SummaryRow, WorstRow};
 use crate::dynamics::Part;
 use crate::margins::envelope::{self, EnvelopeRow};
@@ -19,7 +21,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Version of the tables' columns and metadata; a change of either raises it.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Most cases in a row group.
 const MOST_GROUP_CASES: u64 = 8192;
@@ -203,7 +205,26 @@ fn mode<R>(
 
 /// Columns of a table of draws alone: which case, drawn values, normal scores.
 pub fn plan(outline: &Outline) -> Vec<Column<CaseRow>> {
-    identity(outline).into_iter().chain(draws(outline)).collect()
+    identity(outline).into_iter().chain(structure(outline)).chain(draws(outline)).collect()
+}
+
+/// Which outer draw or replicate a case belongs to, where a plan has them.
+fn structure(outline: &Outline) -> Vec<Column<CaseRow>> {
+    type Of = fn(&Population, u64) -> Option<u64>;
+    let columns: [(&str, &str, Of); 2] = [
+        ("outer", "Outer draw of a nested plan; NULL for other populations", Population::outer),
+        ("replicate", "Replicate of the plan; NULL for other populations", Population::replicate),
+    ];
+    let there = |of: Of| outline.definition.populations.iter().any(|p| of(p, 0).is_some());
+    let columns = columns.into_iter().filter(|(_, _, of)| there(*of));
+    columns
+        .map(|(name, description, of)| {
+            let populations = outline.definition.populations.clone();
+            Column::count(name, description, move |r: &CaseRow| {
+                Some(of(populations.get(r.population)?, r.case)? as i64)
+            })
+        })
+        .collect()
 }
 
 fn identity(outline: &Outline) -> [Column<CaseRow>; 2] {
@@ -218,6 +239,7 @@ fn identity(outline: &Outline) -> [Column<CaseRow>; 2] {
 /// Columns of the `cases` table.
 pub fn cases(outline: &Outline) -> Vec<Column<CaseRow>> {
     let mut columns = Vec::from(identity(outline));
+    columns.extend(structure(outline));
     columns.extend([
         Column::word(
             "status",
@@ -386,14 +408,14 @@ pub fn summary(outline: &Outline) -> Vec<Column<SummaryRow>> {
         Column::number(
             "share_unstable",
             "1",
-            "Share of unstable cases among those with a result",
+            "Share of the cases that are unstable or failed",
             |r: &SummaryRow| r.share_unstable,
         ),
         Column::number(
             "share_unstable_low",
             "1",
-            "Lower end of its exact 95 % interval (Clopper and Pearson); NULL if the cases are \
-             not independent draws",
+            "Lower end of its 95 % interval (Clopper and Pearson; over replicates where `intervals` \
+             says so); NULL where no interval follows from the cases",
             |r: &SummaryRow| r.share_unstable_interval.map(|[low, _]| low),
         ),
         Column::number(
@@ -402,18 +424,48 @@ pub fn summary(outline: &Outline) -> Vec<Column<SummaryRow>> {
             "Upper end of that interval",
             |r: &SummaryRow| r.share_unstable_interval.map(|[_, high]| high),
         ),
+        Column::word(
+            "intervals",
+            "independent_cases: exact binomial, Student's t and order statistics of independent \
+             draws; replicates: Student's t over independent replicates or outer draws; none",
+            Intervals::ALL.map(Intervals::name),
+            |r: &SummaryRow| Intervals::ALL.iter().position(|i| *i == r.intervals),
+        ),
     ];
+    if outline.definition.populations.iter().any(|p| p.outer(0).is_some()) {
+        columns.extend(nested());
+    }
     type Pick = Box<dyn Fn(&Spread) -> Option<f64> + Send>;
-    let mut spread: Vec<(&str, String, Pick)> = vec![
+    let mut spread: Vec<(String, String, Pick)> = Vec::new();
+    let location: Vec<(&str, String, Pick)> = vec![
         ("mean", "Mean".to_owned(), Box::new(|s| Some(s.mean))),
+        (
+            "mean_low",
+            "Lower end of the 95 % interval of the mean".to_owned(),
+            Box::new(|s| s.mean_interval.map(|[low, _]| low)),
+        ),
+        (
+            "mean_high",
+            "Upper end of the 95 % interval of the mean".to_owned(),
+            Box::new(|s| s.mean_interval.map(|[_, high]| high)),
+        ),
         ("sd", "Sample standard deviation".to_owned(), Box::new(|s| s.standard_deviation)),
         ("min", "Least value".to_owned(), Box::new(|s| Some(s.smallest))),
     ];
+    spread.extend(location.into_iter().map(|(name, text, pick)| (name.to_owned(), text, pick)));
     for (index, (level, name)) in LEVELS.into_iter().enumerate() {
         let description = format!("Quantile at {level} (linear between order statistics)");
-        spread.push((name, description, Box::new(move |s| Some(s.quantiles[index]))));
+        spread.push((name.to_owned(), description, Box::new(move |s| Some(s.quantiles[index]))));
+        for (end, words, side) in [("low", "Lower", 0), ("high", "Upper", 1)] {
+            let description = format!(
+                "{words} end of the 95 % interval of the quantile at {level}, failed cases taken for \
+                 the worst on that side; NULL where the cases are too few or give none; value"
+            );
+            let pick: Pick = Box::new(move |s| s.quantile_intervals[index].map(|ends| ends[side]));
+            spread.push((format!("{name}_{end}"), description, pick));
+        }
     }
-    spread.push(("max", "Greatest value".to_owned(), Box::new(|s| Some(s.largest))));
+    spread.push(("max".to_owned(), "Greatest value".to_owned(), Box::new(|s| Some(s.largest))));
     columns.extend(spread.into_iter().map(|(name, description, pick)| {
         Column::number(
             format!("damping_ratio_{name}"),
@@ -448,8 +500,50 @@ pub fn summary(outline: &Outline) -> Vec<Column<SummaryRow>> {
             "Mean of that gain (of each case's least over the flight times, where reduced)",
             |r: &SummaryRow| r.damping_ratio_gain.map(|[_, mean]| mean),
         ),
+        Column::number(
+            "damping_ratio_gain_mean_low",
+            "1",
+            "Lower end of the 95 % interval of the mean gain (paired differences)",
+            |r: &SummaryRow| r.gain_mean_interval.map(|[low, _]| low),
+        ),
+        Column::number(
+            "damping_ratio_gain_mean_high",
+            "1",
+            "Upper end of that interval",
+            |r: &SummaryRow| r.gain_mean_interval.map(|[_, high]| high),
+        ),
     ]);
     columns
+}
+
+/// Columns of the `summary` table that only a nested plan has.
+fn nested() -> Vec<Column<SummaryRow>> {
+    let count = |name: &str, description: &str, get: fn(&SummaryRow) -> Option<u64>| {
+        Column::count(name, description, move |r: &SummaryRow| get(r).map(|n| n as i64))
+    };
+    let number = |name: &str, description: &str, get: fn(&SummaryRow) -> Option<f64>| {
+        Column::number(name, "1", description, get)
+    };
+    vec![
+        count("outer", "Outer draw; NULL for all cases of the population", |r| r.group.outer),
+        Column::word(
+            "statement",
+            "Whether the outer draw meets the plan's statement; NULL for all cases",
+            Statement::ALL.map(Statement::name),
+            |r: &SummaryRow| Statement::ALL.iter().position(|s| Some(*s) == r.statement),
+        ),
+        count("outer_met", "Outer draws that meet it", |r| r.outer.map(|o| o.met)),
+        count("outer_not_met", "Outer draws that do not", |r| r.outer.map(|o| o.not_met)),
+        number("outer_share_met", "Share of the outer draws that meet it", |r| {
+            r.outer.map(|o| o.share_met)
+        }),
+        number("outer_share_met_low", "Lower end of its exact 95 % interval", |r| {
+            r.outer.map(|o| o.share_met_interval[0])
+        }),
+        number("outer_share_met_high", "Upper end of that interval", |r| {
+            r.outer.map(|o| o.share_met_interval[1])
+        }),
+    ]
 }
 
 /// Columns of the `worst` table.
@@ -537,7 +631,7 @@ fn axis<R>(get: impl Fn(&R) -> usize + Send + 'static) -> Column<R> {
 }
 
 /// Columns of the `margins` table.
-pub fn margins(outline: &Outline) -> Vec<Column<LoopRow<Margins>>> {
+pub fn margins(outline: &Outline) -> Vec<Column<MarginRow>> {
     type Pick = fn(&AxisMargins) -> Margin;
     let picks: [(&str, &str, &str, &str, Pick); 6] = [
         (
@@ -579,30 +673,30 @@ pub fn margins(outline: &Outline) -> Vec<Column<LoopRow<Margins>>> {
         "unstable_poles",
         "Closed-loop poles in the right half plane by Nyquist's count; all margins are 0 where \
          there are any; NULL if failed",
-        |r: &LoopRow<Margins>| r.fact.as_ref().ok().map(|(_, unstable)| *unstable),
+        |r: &MarginRow| r.fact.as_ref().ok().map(|(_, unstable)| *unstable),
     ));
     for (stem, suffix, unit, description, pick) in picks {
         columns.push(Column::number(
             format!("{stem}{suffix}"),
             unit,
             format!("{description}; NULL if failed"),
-            move |r: &LoopRow<Margins>| r.fact.as_ref().ok().map(|(axis, _)| pick(axis).value),
+            move |r: &MarginRow| r.fact.as_ref().ok().map(|(axis, _)| pick(axis).value),
         ));
         columns.push(Column::number(
             format!("{stem}_frequency_hz"),
             "Hz",
             "Frequency where it is tightest, 0 for the limit of low frequency; NULL if nothing crosses",
-            move |r: &LoopRow<Margins>| {
+            move |r: &MarginRow| {
                 let (axis, _) = r.fact.as_ref().ok()?;
                 pick(axis).omega_rad_s.map(|omega| omega / TAU)
             },
         ));
     }
     columns.extend([
-        Column::word("status", "ok, or the kind of failure", statuses(), |r: &LoopRow<Margins>| {
+        Column::word("status", "ok, or the kind of failure", statuses(), |r: &MarginRow| {
             Some(status(r.fact.as_ref().err()))
         }),
-        Column::text("failure_message", "What the failure says", |r: &LoopRow<Margins>| {
+        Column::text("failure_message", "What the failure says", |r: &MarginRow| {
             r.fact.as_ref().err().map(|f| f.message.as_str())
         }),
     ]);
@@ -613,9 +707,9 @@ pub fn margins(outline: &Outline) -> Vec<Column<LoopRow<Margins>>> {
 const STABILISED: [Stabilised; 3] = [Stabilised::Gain, Stabilised::Phase, Stabilised::Neither];
 
 /// Columns of the `loop_modes` table.
-pub fn loop_modes(outline: &Outline) -> Vec<Column<LoopRow<Option<NamedPeak>>>> {
+pub fn loop_modes(outline: &Outline) -> Vec<Column<PeakRow>> {
     let number = |name: &str, unit: &str, description: &str, get: fn(&Peak) -> f64| {
-        Column::number(name, unit, description, move |r: &LoopRow<Option<NamedPeak>>| {
+        Column::number(name, unit, description, move |r: &PeakRow| {
             r.fact.as_ref().map(|named| get(&named.peak))
         })
     };
@@ -626,7 +720,7 @@ pub fn loop_modes(outline: &Outline) -> Vec<Column<LoopRow<Option<NamedPeak>>>> 
             "Modal label, rigid motion (axial, roll, pitch, yaw), nozzle, tank or servo with the largest \
              participation in the pole; NULL, as all that follows, for an axis without a resonance \
              above -60 dB or a failed evaluation",
-            |r: &LoopRow<Option<NamedPeak>>| r.fact.as_ref().map(|named| named.motion.as_str()),
+            |r: &PeakRow| r.fact.as_ref().map(|named| named.motion.as_str()),
         ),
         number("pole_re_rad_s", "rad/s", "Real part of the pole, loops open", |p| p.pole.re),
         number("pole_im_rad_s", "rad/s", "Imaginary part of the pole, loops open", |p| p.pole.im),
@@ -641,7 +735,7 @@ pub fn loop_modes(outline: &Outline) -> Vec<Column<LoopRow<Option<NamedPeak>>>> 
              peak the loop is at least the phase margin away from -180 degrees wherever it is within the \
              gain margin of 0 dB; neither",
             STABILISED.map(Stabilised::name),
-            |r: &LoopRow<Option<NamedPeak>>| {
+            |r: &PeakRow| {
                 let how = r.fact.as_ref()?.peak.stabilised;
                 STABILISED.iter().position(|other| *other == how)
             },
@@ -651,21 +745,26 @@ pub fn loop_modes(outline: &Outline) -> Vec<Column<LoopRow<Option<NamedPeak>>>> 
 }
 
 /// Columns of the `loop_curves` table.
-pub fn loop_curves(outline: &Outline) -> Vec<Column<LoopRow<Option<(usize, CurvePoint)>>>> {
-    type Row = LoopRow<Option<(usize, CurvePoint)>>;
+pub fn loop_curves(outline: &Outline) -> Vec<Column<CurveRow>> {
     let plan = outline.definition.margins.iter();
     let grid: Vec<f64> = plan.flat_map(|plan| plan.envelope_hz.clone()).collect();
     let mut columns = loop_identity(outline);
     columns.extend([
-        Column::number("frequency_hz", "Hz", "Frequency; NULL if failed", move |r: &Row| {
+        Column::number("frequency_hz", "Hz", "Frequency; NULL if failed", move |r: &CurveRow| {
             r.fact.and_then(|(index, _)| grid.get(index).copied())
         }),
-        Column::number("magnitude_db", "dB", "Magnitude; NULL for a loop of nothing", |r: &Row| {
-            r.fact.map(|(_, point)| point.magnitude_db)
-        }),
-        Column::number("phase_deg", "deg", "Phase, unwrapped from low frequency", |r: &Row| {
-            r.fact.map(|(_, point)| point.phase_deg)
-        }),
+        Column::number(
+            "magnitude_db",
+            "dB",
+            "Magnitude; NULL for a loop of nothing",
+            |r: &CurveRow| r.fact.map(|(_, point)| point.magnitude_db),
+        ),
+        Column::number(
+            "phase_deg",
+            "deg",
+            "Phase, unwrapped from low frequency",
+            |r: &CurveRow| r.fact.map(|(_, point)| point.phase_deg),
+        ),
     ]);
     columns
 }

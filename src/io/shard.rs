@@ -10,8 +10,7 @@ use super::maker::Maker;
 use super::run::decoded;
 use super::schema::{self, TableName};
 use super::table::{self, Content, Table};
-use crate::campaign::loops::{CurvePoint, NamedPeak};
-use crate::campaign::row::{self, CaseRow, LoopRow, LoopRows, Margins, ModeRow};
+use crate::campaign::row::{self, CaseRow, CurveRow, LoopRows, MarginRow, ModeRow, PeakRow};
 use crate::campaign::{Outline, Record};
 use crate::problem::Problems;
 use arrow::record_batch::RecordBatch;
@@ -78,11 +77,14 @@ pub struct Filling {
     loops: Option<LoopTables>,
 }
 
+/// A finished table of a shard: its bytes and what they hold.
+type Part = (TableName, (Vec<u8>, Content));
+
 /// The tables of loops of a shard being filled.
 struct LoopTables {
-    margins: Table<LoopRow<Margins>, Vec<u8>>,
-    peaks: Table<LoopRow<Option<NamedPeak>>, Vec<u8>>,
-    curves: Option<Table<LoopRow<Option<(usize, CurvePoint)>>, Vec<u8>>>,
+    margins: Table<MarginRow, Vec<u8>>,
+    peaks: Table<PeakRow, Vec<u8>>,
+    curves: Option<Table<CurveRow, Vec<u8>>>,
 }
 
 impl LoopTables {
@@ -99,7 +101,7 @@ impl LoopTables {
         self.margins.gathered().max(self.peaks.gathered()).max(curves)
     }
 
-    fn close(self) -> Result<Vec<(TableName, (Vec<u8>, Content))>, ParquetError> {
+    fn close(self) -> Result<Vec<Part>, ParquetError> {
         let mut parts = vec![
             (TableName::Margins, self.margins.close()?),
             (TableName::LoopModes, self.peaks.close()?),
@@ -182,9 +184,7 @@ impl Filling {
         if let Some(loops) = self.loops {
             parts.extend(loops.close().map_err(failed)?);
         }
-        let of = |(name, (_, content)): &(TableName, (Vec<u8>, Content))| {
-            (name.name().to_owned(), content.clone())
-        };
+        let of = |(name, (_, content)): &Part| (name.name().to_owned(), content.clone());
         let header = Header {
             schema_version: schema::VERSION,
             run: identity.to_owned(),

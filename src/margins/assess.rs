@@ -381,7 +381,7 @@ mod tests {
         let (unstable, margin) = count(-0.5e-3);
         // −0.5e-3/(2·1e-5·31.4) = −0.796 at the resonance.
         assert_eq!(unstable, 0);
-        assert!((margin.value + 20.0 * (0.5e-3 / (2e-5 * 31.4) as f64).log10()).abs() < 1e-6);
+        assert!((margin.value + 20.0 * (0.5e-3 / (2e-5 * 31.4_f64)).log10()).abs() < 1e-6);
         assert_eq!(count(-1e-3).0, 2);
     }
 

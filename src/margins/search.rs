@@ -151,7 +151,7 @@ mod tests {
         assert!((at - 0.3).abs() < 1e-8 && (value / 1e6 - 1.0).abs() < 1e-9, "{at} {value}");
         assert!(count <= 40, "{count}");
         // At the edge of the bracket.
-        let Ok((at, _)) = maximum([0.0, 1.0], (0.5, 0.5), 1e-9, |x| Ok::<_, Infallible>(x));
+        let Ok((at, _)) = maximum([0.0, 1.0], (0.5, 0.5), 1e-9, Ok::<_, Infallible>);
         assert!(at > 1.0 - 1e-8);
     }
 }

@@ -32,7 +32,13 @@ fn undamped(mut vehicle: Vehicle) -> Vehicle {
 
 /// The nominal case of `definition` with the one `variant`, every engine that `gimballed` names.
 fn nominal(definition: &Definition, variant: Variant, gimballed: &str) -> Definition {
-    let nominal = Population { name: "nominal".into(), cases: 1, fixed: vec![], drawn: false };
+    let nominal = Population {
+        name: "nominal".into(),
+        cases: 1,
+        fixed: vec![],
+        drawn: false,
+        scheme: Default::default(),
+    };
     let engines = definition.gimballed.len();
     let gimballed = match gimballed {
         "none" => vec![false; engines],

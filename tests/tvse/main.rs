@@ -9,6 +9,7 @@ mod bad_input;
 mod commands;
 mod damage;
 mod failures;
+mod import;
 mod repeatability;
 mod schema;
 mod stopping;
