@@ -6,6 +6,7 @@ use std::hint::black_box;
 use tvse::campaign::{Definition, Evaluator, LoopPlan, NozzleJet, Population, Slope, Variant};
 use tvse::dispersion::Sampler;
 use tvse::dynamics::{Feedback, Model};
+use tvse::io::scenario::Reach;
 use tvse::margins::Settings;
 use tvse::modal::{Solver, identify};
 use tvse::structure::{self, Selection, Stick};
@@ -17,7 +18,8 @@ const DISPERSION: &str = include_str!("../dispersions/reference.toml");
 
 /// The reference vehicle with this number of elastic modes; the mode of interest by frequency.
 fn vehicle(modes: usize) -> Vehicle {
-    let mut vehicle = tvse::io::scenario::vehicle(VEHICLE.as_ref()).expect("read").resolved.vehicle;
+    let mut vehicle =
+        tvse::io::scenario::vehicle(VEHICLE.as_ref(), Reach::Study).expect("read").resolved.vehicle;
     let stick = include_str!("../vehicles/sls-like/stick.toml");
     let stick = Stick::parse(stick, "stick.toml").expect("parsed");
     let thresholds = structure::Thresholds::default();
@@ -132,7 +134,8 @@ fn layers(criterion: &mut Criterion) {
 
 /// What the loops cost: an evaluation with the loops open, closed, and closed with its margins.
 fn loops(criterion: &mut Criterion) {
-    let vehicle = tvse::io::scenario::vehicle(VEHICLE.as_ref()).expect("read").resolved.vehicle;
+    let vehicle =
+        tvse::io::scenario::vehicle(VEHICLE.as_ref(), Reach::Study).expect("read").resolved.vehicle;
     let dispersion =
         tvse::scenario::dispersion::read("reference.toml", DISPERSION, &vehicle).expect("read");
     let mut group = criterion.benchmark_group("loops");

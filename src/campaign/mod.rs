@@ -10,6 +10,7 @@ pub mod loops;
 pub mod metric;
 pub mod nested;
 pub mod outline;
+pub mod planar;
 pub mod plant;
 pub mod pool;
 pub mod record;

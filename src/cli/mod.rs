@@ -18,6 +18,7 @@ pub mod margins;
 pub mod merge;
 pub mod modes;
 pub mod nominal;
+pub mod outside;
 pub mod part;
 pub mod plan;
 pub mod planar;
@@ -31,6 +32,7 @@ pub mod selection;
 pub mod sensitivity;
 pub mod statistics;
 pub mod status;
+pub mod submit;
 pub mod summary;
 
 pub use error::Error;
@@ -70,6 +72,7 @@ enum Command {
     Run(run::Args),
     Merge(merge::Args),
     Status(status::Args),
+    Submit(submit::Args),
     Retry(retry::Args),
     Summary(summary::Args),
     Statistics(statistics::Args),
@@ -133,6 +136,7 @@ pub fn run() -> ExitCode {
         Command::Run(args) => run::run(args, &mut out),
         Command::Merge(args) => merge::run(args, &mut out),
         Command::Status(args) => status::run(args, &mut out),
+        Command::Submit(args) => submit::run(args, &mut out),
         Command::Retry(args) => retry::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),
         Command::Statistics(args) => statistics::run(args, &mut out),

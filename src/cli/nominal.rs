@@ -19,6 +19,8 @@ pub struct Args {
     /// Every pole, not only those of the modes of interest
     #[arg(long)]
     all: bool,
+    #[command(flatten)]
+    outside: super::outside::Args,
 }
 
 /// Runs the command.
@@ -26,7 +28,7 @@ pub struct Args {
 /// # Errors
 /// All problems of the run and what it names.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
-    let loaded = io::scenario::load(&args.run)?;
+    let loaded = io::scenario::load(&args.run, args.outside.reach())?;
     let nominal = Population {
         name: "nominal".into(),
         cases: 1,

@@ -21,6 +21,8 @@ pub struct Args {
     /// File for the draws of every case; it must not exist
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    outside: super::outside::Args,
 }
 
 /// Runs the command.
@@ -28,7 +30,7 @@ pub struct Args {
 /// # Errors
 /// All problems of the run and what it names; an output file that exists or cannot be written.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
-    let loaded = io::scenario::load(&args.run)?;
+    let loaded = io::scenario::load(&args.run, args.outside.reach())?;
     let mut definition = loaded.definition.clone();
     let corners = loaded.corners.iter().flat_map(|c| c.populations(&definition.populations));
     let open: Vec<usize> = corners.collect();

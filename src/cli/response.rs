@@ -2,7 +2,6 @@
 
 use super::{Error, PASS};
 use crate::campaign::{Evaluator, StoredPoles};
-use crate::dispersion::Sampler;
 use crate::io::response::Response;
 use crate::io::{Run, inputs};
 use crate::spelling::allowed_instead;
@@ -89,7 +88,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     }
 
     let loaded = inputs::read(&args.run, &outline.inputs)?;
-    let sampler = Sampler::new(&loaded.dispersion, definition.seed);
+    let sampler = loaded.sampler(definition)?;
     let all = outline.poles == StoredPoles::All;
     let evaluator = Evaluator::new(&loaded.vehicle.vehicle, &sampler, definition, all)
         .map_err(|error| super::run::unprepared(Path::new(&loaded.run.0), &error))?;

@@ -2,7 +2,7 @@
 
 use super::campaign::{self, evaluate, finish};
 use super::interrupt::Interrupt;
-use super::progress::Show;
+use super::progress::{Show, Shown};
 use super::{Error, PASS};
 use crate::campaign::pool::{Pool, Span};
 use crate::campaign::{Evaluator, StoredPoles};
@@ -61,7 +61,8 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let results = Results::of(store);
     campaign::say_mended(&results);
     let case = |population, case| evaluator.evaluate(population, case);
-    let results = evaluate(results, definition, &failed, &pool, args.progress, &interrupt, case)?;
+    let shown = Shown::new(args.progress, None);
+    let results = evaluate(results, definition, &failed, &pool, shown, &interrupt, case)?;
     let code = finish(results, jobs, &vehicle.name, None, out)?;
     let after = cases(&self::failed(&Run::open(&args.run)?)?);
     writeln!(out, "{before} failed cases were evaluated again, {after} of them fail still")?;

@@ -47,6 +47,8 @@ pub struct Args {
     poles: Poles,
     #[command(flatten)]
     options: Options,
+    #[command(flatten)]
+    outside: super::outside::Args,
 }
 
 /// Which poles the `modes` table holds.
@@ -64,7 +66,7 @@ enum Poles {
 /// All problems of the run and what it names; an output folder that exists or cannot be written; a
 /// signal that asks to stop. Then what is evaluated is kept.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
-    let mut loaded = io::scenario::load(&args.run)?;
+    let mut loaded = io::scenario::load(&args.run, args.outside.reach())?;
     let folder = args.output.clone().unwrap_or_else(|| args.run.with_extension(""));
     let (opening, access) = args.options.opening(&folder, args.cases.is_some())?;
     let definition = &mut loaded.definition;

@@ -22,7 +22,7 @@ pub mod run;
 pub mod scaffold;
 pub mod scenario;
 pub mod schema;
-mod shard;
+pub mod shard;
 pub mod source;
 pub mod store;
 mod stored;

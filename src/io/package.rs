@@ -123,6 +123,11 @@ pub const SECTIONS: Layout = Layout {
         ),
     ],
 };
+/// Layouts of the tables.
+pub fn layouts() -> [&'static Layout; 5] {
+    LAYOUTS
+}
+
 const LAYOUTS: [&Layout; 5] = [&GRIDS, &MODES, &SHAPES, &MASS, &PARENTS];
 
 /// `package.toml`.

@@ -70,11 +70,21 @@ pub struct LoadedVehicle {
 /// Name of the vehicle file inside a vehicle's folder.
 const VEHICLE_FILE: &str = "vehicle.toml";
 
+/// How far the paths in scenario files may reach: they come from colleagues, too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reach {
+    /// Not out of the study: the folder of the first file, or the one above it if that is called
+    /// `runs`. Links are followed before it is judged.
+    Study,
+    /// Anywhere.
+    Anywhere,
+}
+
 /// Where the files lie that a file names.
 #[derive(Clone, Copy)]
 enum Place<'a> {
-    /// Where it says, relative to itself.
-    Named,
+    /// Where it says, relative to itself; with a folder, not outside of it.
+    Named(Option<&'a Path>),
     /// Among the copies of a run's inputs in this folder, whatever it says.
     Copies(&'a Path),
 }
@@ -83,18 +93,38 @@ impl Place<'_> {
     /// What `file` names `path` at `key`.
     fn find(self, file: &Path, path: &str, key: &str) -> PathBuf {
         match self {
-            Self::Named => file.parent().unwrap_or(Path::new("")).join(path),
+            Self::Named(_) => file.parent().unwrap_or(Path::new("")).join(path),
             Self::Copies(folder) => inputs::copy_of(folder, key),
         }
     }
+}
+
+impl Place<'_> {
+    /// What is allowed instead of `path`, if that lies outside of the study.
+    fn refusal(self, path: &Path) -> Option<String> {
+        let Self::Named(Some(study)) = self else { return None };
+        let outside = !files::resolved(path).starts_with(study);
+        outside.then(|| format!("a path inside {}, or --allow-outside", files::name(study)))
+    }
+}
+
+/// The study of a file.
+fn study(path: &Path) -> PathBuf {
+    let folder = files::resolved(path.parent().unwrap_or(Path::new("")));
+    let above = folder.parent().filter(|_| folder.file_name().is_some_and(|n| n == "runs"));
+    above.unwrap_or(&folder).to_owned()
 }
 
 /// Reads a vehicle: its file, or the folder that holds it, and its modal package.
 ///
 /// # Errors
 /// All problems of the file and of the package.
-pub fn vehicle(path: &Path) -> Result<LoadedVehicle, Problems> {
-    vehicle_from(path, Place::Named)
+pub fn vehicle(path: &Path, reach: Reach) -> Result<LoadedVehicle, Problems> {
+    let file = if path.is_dir() { path.join(VEHICLE_FILE) } else { path.to_owned() };
+    match reach {
+        Reach::Anywhere => vehicle_from(&file, Place::Named(None)),
+        Reach::Study => vehicle_from(&file, Place::Named(Some(&study(&file)))),
+    }
 }
 
 fn vehicle_from(path: &Path, place: Place<'_>) -> Result<LoadedVehicle, Problems> {
@@ -104,7 +134,7 @@ fn vehicle_from(path: &Path, place: Place<'_>) -> Result<LoadedVehicle, Problems
     let (raw, mut findings) = table::read::<VehicleFile>(&name, &text)?;
     let modal_package = place.find(&path, &raw.modal_package, "modal_package");
     let at = (raw.modal_package.as_str(), modal_package.as_path());
-    let modal = named(at, "modal_package", &mut findings, package::read);
+    let modal = named(at, "modal_package", place, &mut findings, package::read);
     let resolved = scenario::vehicle::resolve(&raw, modal, findings)?;
     Ok(LoadedVehicle { resolved, text: (name, text), modal_package })
 }
@@ -113,8 +143,11 @@ fn vehicle_from(path: &Path, place: Place<'_>) -> Result<LoadedVehicle, Problems
 ///
 /// # Errors
 /// All problems of the run file, the vehicle, the modal package, the dispersion table and the gates.
-pub fn load(path: &Path) -> Result<Loaded, Problems> {
-    load_from(path, Place::Named)
+pub fn load(path: &Path, reach: Reach) -> Result<Loaded, Problems> {
+    match reach {
+        Reach::Anywhere => load_from(path, Place::Named(None)),
+        Reach::Study => load_from(path, Place::Named(Some(&study(path)))),
+    }
 }
 
 /// Reads the copies of a run's inputs in `folder`; gates are none of them.
@@ -132,10 +165,10 @@ fn load_from(path: &Path, place: Place<'_>) -> Result<Loaded, Problems> {
 
     let found = place.find(path, &raw.vehicle, "vehicle");
     let at = (raw.vehicle.as_str(), found.as_path());
-    let vehicle = named(at, "vehicle", &mut findings, |file| vehicle_from(file, place));
+    let vehicle = named(at, "vehicle", place, &mut findings, |file| vehicle_from(file, place));
     let found = place.find(path, &raw.dispersion, "dispersion");
     let at = (raw.dispersion.as_str(), found.as_path());
-    let dispersion = named(at, "dispersion", &mut findings, |file| {
+    let dispersion = named(at, "dispersion", place, &mut findings, |file| {
         let name = files::name(file);
         let text = files::read_text(file)?;
         // Rows are only understood against the vehicle.
@@ -149,10 +182,10 @@ fn load_from(path: &Path, place: Place<'_>) -> Result<Loaded, Problems> {
         };
         Ok((dispersion, (name, text)))
     });
-    let gates = raw.gates.as_ref().filter(|_| matches!(place, Place::Named));
+    let gates = raw.gates.as_ref().filter(|_| matches!(place, Place::Named(_)));
     let gates = gates.and_then(|gates| {
         let found = place.find(path, gates, "gates");
-        named((gates, &found), "gates", &mut findings, |file| {
+        named((gates, &found), "gates", place, &mut findings, |file| {
             gate::parse(&files::read_text(file)?, &files::name(file))?;
             Ok(file.to_owned())
         })
@@ -201,7 +234,9 @@ fn plan_file(
     let scores = *columns == Some(ColumnsFile::NormalScore);
     // Its columns are only understood against the dispersion.
     let dispersion = dispersion?;
-    named((path, &found), "plan.path", findings, |file| listed::load(file, scores, dispersion))
+    named((path, &found), "plan.path", place, findings, |file| {
+        listed::load(file, scores, dispersion)
+    })
 }
 
 /// Reads what a file names at `key`, given what stands there and the path that is meant; its
@@ -209,11 +244,16 @@ fn plan_file(
 fn named<T>(
     (text, path): (&str, &Path),
     key: &str,
+    place: Place<'_>,
     findings: &mut table::Findings,
     read: impl FnOnce(&Path) -> Result<T, Problems>,
 ) -> Option<T> {
     if text.is_empty() {
         findings.push(key, "an empty text", "a path relative to this file");
+        return None;
+    }
+    if let Some(allowed) = place.refusal(path) {
+        findings.push(key, format!("\"{text}\""), allowed);
         return None;
     }
     if !path.exists() {
@@ -246,20 +286,20 @@ mod tests {
     }
 
     fn problems(study: &Path) -> Problems {
-        load(&study.join("runs/reference.toml")).expect_err("a problem")
+        load(&study.join("runs/reference.toml"), Reach::Study).expect_err("a problem")
     }
 
     #[test]
     fn a_run_loads_with_the_texts_of_its_files_and_a_vehicle_by_folder_or_file() {
         let (_place, study) = edited("runs/smoke.toml", "sls-like\"", "sls-like/vehicle.toml\"");
-        let loaded = load(&study.join("runs/smoke.toml")).unwrap();
+        let loaded = load(&study.join("runs/smoke.toml"), Reach::Study).unwrap();
         assert_eq!(loaded.definition.name, "smoke");
         for (name, text) in [&loaded.run, &loaded.vehicle_file, &loaded.dispersion_file] {
             assert_eq!(&files::read_text(Path::new(name)).unwrap(), text);
         }
-        let by_folder = vehicle(&study.join("vehicles/sls-like")).unwrap();
+        let by_folder = vehicle(&study.join("vehicles/sls-like"), Reach::Study).unwrap();
         assert!(by_folder.text.1 == loaded.vehicle_file.1);
-        let reference = load(&study.join("runs/reference.toml")).unwrap();
+        let reference = load(&study.join("runs/reference.toml"), Reach::Study).unwrap();
         assert!(reference.gates.unwrap().ends_with("reference.gates.toml"));
     }
 
@@ -293,7 +333,7 @@ mod tests {
             let problems = problems(&study);
             assert_eq!((problems.0.len(), problems.0[0].key.as_str()), (1, key), "{problems}");
         }
-        assert!(load(Path::new("no/such/run.toml")).is_err());
+        assert!(load(Path::new("no/such/run.toml"), Reach::Study).is_err());
     }
 
     #[test]
