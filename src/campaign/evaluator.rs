@@ -9,7 +9,7 @@ use super::plant::Extent;
 use super::{
     Branch, Definition, Evaluation, Failure, FailureKind, Pole, Population, Record, Variant,
 };
-use crate::dispersion::{Affine, Cursor, Dispersion, Sampler};
+use crate::dispersion::{Affine, Cursor, Dispersion, Draws, Sampler};
 use crate::dynamics::{DrawnVehicle, Effects, Model, Part, Plant};
 use crate::margins::Assessment;
 use crate::modal::{self, Reference, Solver, eigen, identify};
@@ -193,12 +193,7 @@ impl<'a> Evaluator<'a> {
     pub fn visit(&self, population: usize, case: u64, mut look: impl FnMut(&View<'_>)) -> Record {
         let mut workspace = self.take();
         let Workspace { buffers: all_buffers, cursor, vehicle, poles } = &mut workspace;
-        let rule = &self.definition.populations[population];
-        let draws = if rule.scheme.is_monte_carlo() {
-            cursor.draw(case, &rule.fixed, rule.drawn)
-        } else {
-            cursor.draw_planned(case)
-        };
+        let draws = self.draws(cursor, population, case);
         let mut evaluations = Vec::new();
         for (flight_time, at) in self.times.iter().enumerate() {
             let parameters = self.sampler.dispersion().parameters();
@@ -219,6 +214,16 @@ impl<'a> Evaluator<'a> {
         let (values, scores) = (draws.values.clone(), draws.scores.clone());
         self.workspaces.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
         Record { population, case, values, scores, evaluations }
+    }
+
+    /// The draws of a case.
+    fn draws<'b>(&self, cursor: &'b mut Cursor<'_>, population: usize, case: u64) -> &'b Draws {
+        let rule = &self.definition.populations[population];
+        if rule.scheme.is_monte_carlo() {
+            cursor.draw(case, &rule.fixed, rule.drawn)
+        } else {
+            cursor.draw_planned(case)
+        }
     }
 
     /// The loops of a drawn vehicle in a variant, where they are assessed; `poles` are those of the
@@ -260,8 +265,7 @@ impl<'a> Evaluator<'a> {
         };
         let mut workspace = self.take();
         let Workspace { buffers, cursor, vehicle, poles } = &mut workspace;
-        let rule = &self.definition.populations[population];
-        let draws = cursor.draw(case, &rule.fixed, rule.drawn);
+        let draws = self.draws(cursor, population, case);
         let parameters = self.sampler.dispersion().parameters();
         at.slots.draw(self.vehicle, parameters, &draws.effects, vehicle)?;
         // The poles about which the grid is refined, as in the run.
