@@ -7,11 +7,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules from the lowest layer up; those of one layer do not name each other.
-const LAYERS: [&[&str]; 9] = [
+const LAYERS: [&[&str]; 10] = [
     &["problem", "spelling", "stats"],
     &["vehicle"],
     &["dynamics", "dispersion", "structure", "fem"],
     &["modal", "import"],
+    &["margins"],
     &["campaign"],
     &["gate"],
     &["scenario", "report"],

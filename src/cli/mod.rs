@@ -14,6 +14,7 @@ pub mod how_many;
 pub mod import;
 pub mod init;
 pub mod interrupt;
+pub mod margins;
 pub mod merge;
 pub mod modes;
 pub mod nominal;
@@ -23,6 +24,7 @@ pub mod plan;
 pub mod planar;
 pub mod progress;
 pub mod replay;
+pub mod response;
 pub mod retry;
 pub mod run;
 pub mod schema;
@@ -78,8 +80,10 @@ enum Command {
     Compare(compare::Args),
     Gate(gate::Args),
     Replay(replay::Args),
+    Response(response::Args),
     HowMany(how_many::Args),
     Planar(planar::Args),
+    Margins(margins::Args),
     Actuator(actuator::Args),
     Schema(schema::Args),
     Completions(completions::Args),
@@ -140,8 +144,10 @@ pub fn run() -> ExitCode {
         Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
+        Command::Response(args) => response::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),
+        Command::Margins(args) => margins::run(args, &mut out),
         Command::Actuator(args) => actuator::run(args, &mut out),
         Command::Schema(args) => schema::run(args, &mut out),
         Command::Completions(args) => completions::run(args, &mut out),

@@ -2,6 +2,7 @@
 
 mod assemble;
 pub mod column;
+mod envelope;
 mod fault;
 pub mod files;
 pub mod flat;
@@ -15,6 +16,7 @@ pub mod manifest;
 pub mod package;
 pub mod plan;
 pub mod replay;
+pub mod response;
 pub mod results;
 pub mod run;
 pub mod scaffold;
