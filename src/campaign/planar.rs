@@ -3,7 +3,7 @@
 //! The draws are those of any campaign: a function of seed, draw key and case. The only named mode
 //! is the least damped pole of the pair.
 
-use super::definition::{Definition, Population, Slope, Variant};
+use super::definition::{Definition, Feedback, Population, Slope, Variant};
 use super::outline::{DrawColumn, Input, Outline, StoredPoles};
 use super::record::{Branch, Evaluation, Failure, FailureKind, Pole, Record, damping_ratio};
 use crate::dispersion::stream::Stream;
@@ -108,6 +108,8 @@ impl PlanarCampaign {
             rigid_body: false,
             slosh: false,
             aerodynamics: false,
+            feedback: Feedback::Open,
+            actuators: None,
         };
         let definition = Definition {
             name: "planar".to_owned(),
