@@ -37,6 +37,7 @@ fn definition(vehicle: &Vehicle) -> Definition {
         cases,
         fixed: Vec::new(),
         drawn,
+        scheme: Default::default(),
     };
     Definition {
         name: "bench".to_owned(),

@@ -3,12 +3,13 @@
 //! The draws are those of any campaign: a function of seed, draw key and case. The only named mode
 //! is the least damped pole of the pair.
 
-use super::definition::{Definition, Feedback, Population, Slope, Variant};
+use super::definition::{Definition, Population, Slope, Variant};
 use super::outline::{DrawColumn, Input, Outline, StoredPoles};
 use super::record::{Branch, Evaluation, Failure, FailureKind, Pole, Record, damping_ratio};
 use crate::dispersion::stream::Stream;
-use crate::dispersion::{Law, Position};
+use crate::dispersion::{Law, Position, Scheme};
 use crate::dynamics::planar::{Parameters, Planar};
+use crate::dynamics::servo::Feedback;
 
 /// A parameter that may be scattered: name, unit and where it stands.
 type Line = (&'static str, &'static str, fn(&mut Parameters) -> &mut f64);
@@ -97,6 +98,7 @@ impl PlanarCampaign {
             cases,
             fixed: Vec::new(),
             drawn,
+            scheme: Scheme::MonteCarlo,
         };
         let variant = Variant {
             name: "planar".to_owned(),

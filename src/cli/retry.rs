@@ -6,7 +6,6 @@ use super::progress::{Show, Shown};
 use super::{Error, PASS};
 use crate::campaign::pool::{Pool, Span};
 use crate::campaign::{Evaluator, StoredPoles};
-use crate::dispersion::Sampler;
 use crate::io::store::{Access, Store};
 use crate::io::{Results, Run, inputs};
 use std::io::Write;
@@ -49,7 +48,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let outline = stored.outline();
     let definition = &outline.definition;
     let loaded = inputs::read(&args.run, &outline.inputs)?;
-    let sampler = Sampler::new(&loaded.dispersion, definition.seed);
+    let sampler = loaded.sampler(definition)?;
     let all = outline.poles == StoredPoles::All;
     let vehicle = &loaded.vehicle.vehicle;
     let evaluator = Evaluator::new(vehicle, &sampler, definition, all)

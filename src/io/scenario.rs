@@ -2,12 +2,13 @@
 //!
 //! What the files say is understood in `scenario`; paths in a file are relative to that file.
 
+use super::listed::{self, Format};
 use super::{files, inputs, package};
 use crate::campaign::Definition;
-use crate::dispersion::Dispersion;
+use crate::dispersion::{Dispersion, Listed, Sampler};
 use crate::gate;
 use crate::problem::Problems;
-use crate::scenario::run_file::RunFile;
+use crate::scenario::run_file::{ColumnsFile, PlanFile, RunFile};
 use crate::scenario::vehicle_file::VehicleFile;
 use crate::scenario::{self, Corner, Resolved, Run, table};
 use std::path::{Path, PathBuf};
@@ -33,6 +34,26 @@ pub struct Loaded {
     pub dispersion_file: (String, String),
     /// The folder of the modal package.
     pub modal_package: PathBuf,
+    /// Kind, bytes and cases of the plan file, if the run has one.
+    pub plan_file: Option<(Format, Vec<u8>, Listed)>,
+}
+
+impl Loaded {
+    /// The sampler for `definition`, which is that of the run or one with another seed or number of
+    /// cases.
+    ///
+    /// # Errors
+    /// A plan that does not fit its number of cases.
+    pub fn sampler(&self, definition: &Definition) -> Result<Sampler<'_>, Problems> {
+        let mut sampler = Sampler::new(&self.dispersion, definition.seed);
+        let listed = self.plan_file.as_ref().map(|(_, _, listed)| listed);
+        for population in definition.populations.iter().filter(|p| !p.scheme.is_monte_carlo()) {
+            sampler = sampler
+                .with_plan(&population.scheme, population.cases, listed)
+                .map_err(|r| Problems::input(&self.run.0, r.key, r.found, r.allowed))?;
+        }
+        Ok(sampler)
+    }
 }
 
 /// A vehicle with the texts of its file and the folder of its modal package.
@@ -171,10 +192,12 @@ fn load_from(path: &Path, place: Place<'_>) -> Result<Loaded, Problems> {
     });
     let (dispersion, dispersion_file) = dispersion.unzip();
     let dispersion = dispersion.flatten();
+    let plan_file = plan_file(path, &raw.plan, place, dispersion.as_ref(), &mut findings);
     let stem = path.file_stem().map_or("run".into(), |stem| stem.to_string_lossy().into_owned());
     let resolved = vehicle.as_ref().map(|v| &v.resolved);
+    let listed = plan_file.as_ref().map(|(_, _, listed)| listed);
     let Run { definition, corners } =
-        scenario::run::resolve(&raw, &stem, resolved, dispersion.as_ref(), findings)?;
+        scenario::run::resolve(&raw, &stem, resolved, dispersion.as_ref(), listed, findings)?;
     // What could not be read is among the problems already returned.
     let missing = || Problems::input(&name, "", "an incomplete scenario", "all its files");
     let (vehicle, dispersion) = (vehicle.ok_or_else(missing)?, dispersion.ok_or_else(missing)?);
@@ -189,6 +212,30 @@ fn load_from(path: &Path, place: Place<'_>) -> Result<Loaded, Problems> {
         vehicle_file: vehicle.text,
         dispersion_file,
         modal_package: vehicle.modal_package,
+        plan_file,
+    })
+}
+
+/// The plan file of a run, where its plan has one and it can be understood.
+fn plan_file(
+    run: &Path,
+    plan: &PlanFile,
+    place: Place<'_>,
+    dispersion: Option<&Dispersion>,
+    findings: &mut table::Findings,
+) -> Option<(Format, Vec<u8>, Listed)> {
+    let PlanFile::File { path, columns } = plan else { return None };
+    let copy = inputs::PLANS.iter().find(|(_, format)| Format::of(path) == Some(*format));
+    let Some((copy, _)) = copy else {
+        findings.push("plan.path", format!("\"{path}\""), "a name in `.csv` or `.parquet`");
+        return None;
+    };
+    let found = place.find(run, path, copy);
+    let scores = *columns == Some(ColumnsFile::NormalScore);
+    // Its columns are only understood against the dispersion.
+    let dispersion = dispersion?;
+    named((path, &found), "plan.path", place, findings, |file| {
+        listed::load(file, scores, dispersion)
     })
 }
 

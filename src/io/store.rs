@@ -321,8 +321,16 @@ impl Store {
     /// Adds `more` cases to every drawn population.
     ///
     /// # Errors
-    /// An input problem if it cannot be written down.
+    /// An input problem if it cannot be written down, or if the plan of a population cannot have so
+    /// many more cases, or any without changing the first ones.
     pub fn extend(&mut self, more: u64) -> Result<(), Problems> {
+        let draws = self.outline.draws.len() as u64;
+        for p in self.outline.definition.populations.iter().filter(|p| p.drawn) {
+            p.scheme.check_extension(more, draws).map_err(|refusal| {
+                let key = format!("{}.{}", p.name, refusal.key);
+                Problems::input(files::name(&self.folder), key, refusal.found, refusal.allowed)
+            })?;
+        }
         self.outline.definition.add_cases(more);
         let started = Started {
             schema_version: schema::VERSION,

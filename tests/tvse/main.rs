@@ -10,6 +10,7 @@ mod commands;
 mod corpus;
 mod damage;
 mod failures;
+mod import;
 mod outside;
 mod parsers;
 mod repeatability;
