@@ -125,6 +125,8 @@ impl Buffers {
 pub struct View<'a> {
     /// Plant of the evaluation.
     pub plant: &'a Plant,
+    /// The drawn vehicle; meaningless where the draw failed.
+    pub drawn: &'a DrawnVehicle,
     /// Model of the evaluation; meaningless where the draw failed.
     pub model: &'a Model,
     /// What was found.
@@ -193,7 +195,8 @@ impl<'a> Evaluator<'a> {
                     drawn.clone().and_then(|()| self.solve(at, variant, vehicle, buffers, poles));
                 let null_poles = buffers.model.null_states.len();
                 let evaluation = Evaluation { variant, flight_time, null_poles, outcome };
-                look(&View { plant, model: &buffers.model, evaluation: &evaluation });
+                let model = &buffers.model;
+                look(&View { plant, drawn: vehicle, model, evaluation: &evaluation });
                 evaluations.push(evaluation);
             }
         }

@@ -13,6 +13,7 @@ pub mod how_many;
 pub mod init;
 pub mod interrupt;
 pub mod merge;
+pub mod model;
 pub mod modes;
 pub mod nominal;
 pub mod part;
@@ -58,6 +59,7 @@ enum Command {
     Check(check::Args),
     Plan(plan::Args),
     Modes(modes::Args),
+    Model(model::Args),
     Nominal(nominal::Args),
     Run(run::Args),
     Merge(merge::Args),
@@ -115,6 +117,7 @@ pub fn run() -> ExitCode {
         Command::Check(args) => check::run(args, &mut out),
         Command::Plan(args) => plan::run(args, &mut out),
         Command::Modes(args) => modes::run(args, &mut out),
+        Command::Model(args) => model::run(args, &mut out),
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),
         Command::Merge(args) => merge::run(args, &mut out),

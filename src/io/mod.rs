@@ -1,5 +1,6 @@
 //! Input and output: the only module that touches the disk.
 
+pub mod actuator;
 mod assemble;
 pub mod column;
 mod fault;
@@ -10,6 +11,7 @@ pub mod inputs;
 pub mod lock;
 pub mod maker;
 pub mod manifest;
+pub mod model;
 pub mod package;
 pub mod plan;
 pub mod replay;

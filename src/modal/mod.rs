@@ -2,6 +2,7 @@
 
 pub mod eigen;
 pub mod identify;
+pub mod realisation;
 
 pub use eigen::{Pair, Solver};
 pub use identify::{Candidate, Identity, Reference};

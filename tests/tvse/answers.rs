@@ -10,7 +10,7 @@ use tvse::dynamics::{Layout, Model};
 use tvse::io::scenario::{self, Loaded};
 use tvse::scenario::dispersion;
 use tvse::structure::Thresholds;
-use tvse::vehicle::{Modal, Mode, ModeSet, Vehicle};
+use tvse::vehicle::{Law, Modal, Mode, ModeSet, Vehicle};
 
 const RUN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/runs/smoke.toml");
 /// As the solver's own check of its poles: n ε times the greatest pole, times a modest factor.
@@ -25,7 +25,10 @@ fn undamped(mut vehicle: Vehicle) -> Vehicle {
     vehicle.structural_damping = 0.0;
     for engine in &mut vehicle.engines {
         engine.bearing_damping_n_m_s_rad = 0.0;
-        engine.actuators.iter_mut().for_each(|actuator| actuator.law.damping_ratio = 0.0);
+        for actuator in &mut engine.actuators {
+            let Law::SecondOrder(law) = &mut actuator.law else { panic!("another kind") };
+            law.damping_ratio = 0.0;
+        }
     }
     vehicle
 }

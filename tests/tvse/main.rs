@@ -11,5 +11,6 @@ mod damage;
 mod failures;
 mod repeatability;
 mod schema;
+mod servo;
 mod stopping;
 mod study;
