@@ -31,6 +31,8 @@ pub struct Args {
     /// Frequencies of the table, Hz: COUNT of them, evenly spaced on a logarithmic scale
     #[arg(long, value_name = "FROM:TO:COUNT", default_value = "0.1:100:301")]
     frequencies: String,
+    #[command(flatten)]
+    outside: super::outside::Args,
 }
 
 /// Runs the command.
@@ -38,7 +40,7 @@ pub struct Args {
 /// # Errors
 /// All problems of the vehicle; an engine that does not exist.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
-    let vehicle = io::scenario::vehicle(&args.vehicle)?.resolved.vehicle;
+    let vehicle = io::scenario::vehicle(&args.vehicle, args.outside.reach())?.resolved.vehicle;
     let chosen = args.engine.as_deref().unwrap_or("*.*");
     let paths: Vec<String> = vehicle.engines.iter().map(|e| e.path()).collect();
     if !paths.iter().any(|path| pattern::matches(chosen, path)) {

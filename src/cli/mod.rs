@@ -6,16 +6,19 @@
 pub mod actuator;
 pub mod campaign;
 pub mod check;
+pub mod compare;
 pub mod completions;
 pub mod error;
 pub mod gate;
 pub mod how_many;
+pub mod import;
 pub mod init;
 pub mod interrupt;
 pub mod merge;
 pub mod model;
 pub mod modes;
 pub mod nominal;
+pub mod outside;
 pub mod part;
 pub mod plan;
 pub mod planar;
@@ -24,7 +27,11 @@ pub mod replay;
 pub mod retry;
 pub mod run;
 pub mod schema;
+pub mod selection;
+pub mod sensitivity;
+pub mod statistics;
 pub mod status;
+pub mod submit;
 pub mod summary;
 
 pub use error::Error;
@@ -60,12 +67,17 @@ enum Command {
     Plan(plan::Args),
     Modes(modes::Args),
     Model(model::Args),
+    Import(import::Args),
     Nominal(nominal::Args),
     Run(run::Args),
     Merge(merge::Args),
     Status(status::Args),
+    Submit(submit::Args),
     Retry(retry::Args),
     Summary(summary::Args),
+    Statistics(statistics::Args),
+    Sensitivity(sensitivity::Args),
+    Compare(compare::Args),
     Gate(gate::Args),
     Replay(replay::Args),
     HowMany(how_many::Args),
@@ -118,12 +130,17 @@ pub fn run() -> ExitCode {
         Command::Plan(args) => plan::run(args, &mut out),
         Command::Modes(args) => modes::run(args, &mut out),
         Command::Model(args) => model::run(args, &mut out),
+        Command::Import(args) => import::run(args, &mut out),
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),
         Command::Merge(args) => merge::run(args, &mut out),
         Command::Status(args) => status::run(args, &mut out),
+        Command::Submit(args) => submit::run(args, &mut out),
         Command::Retry(args) => retry::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),
+        Command::Statistics(args) => statistics::run(args, &mut out),
+        Command::Sensitivity(args) => sensitivity::run(args, &mut out),
+        Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),

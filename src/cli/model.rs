@@ -46,6 +46,8 @@ pub struct Args {
     /// Replace older tables in that folder
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    outside: super::outside::Args,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -63,7 +65,7 @@ enum FormatArg {
 /// written.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let (loaded, definition) = if args.run.is_file() {
-        let loaded = io::scenario::load(&args.run)?;
+        let loaded = io::scenario::load(&args.run, args.outside.reach())?;
         if let Some(corner) = loaded.corners.iter().find(|c| args.population.starts_with(&c.name)) {
             return Err(Error::Usage(format!(
                 "--population: found \"{}\"; allowed: one without evaluated signs, or the folder of a finished run",

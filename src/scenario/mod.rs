@@ -8,8 +8,11 @@ pub mod dispersion;
 #[cfg(test)]
 mod fixture;
 pub mod gimbal;
+pub mod import;
+pub mod import_file;
 pub mod names;
 pub mod pattern;
+pub mod plan;
 pub mod run;
 pub mod run_file;
 pub mod schema;

@@ -17,7 +17,7 @@ const RUN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/runs/smoke.toml");
 const BACKWARD: f64 = 1e4;
 
 fn loaded() -> Loaded {
-    scenario::load(Path::new(RUN)).unwrap()
+    scenario::load(Path::new(RUN), scenario::Reach::Study).unwrap()
 }
 
 /// No structural and no actuator damping.
@@ -35,7 +35,13 @@ fn undamped(mut vehicle: Vehicle) -> Vehicle {
 
 /// The nominal case of `definition` with the one `variant`, every engine that `gimballed` names.
 fn nominal(definition: &Definition, variant: Variant, gimballed: &str) -> Definition {
-    let nominal = Population { name: "nominal".into(), cases: 1, fixed: vec![], drawn: false };
+    let nominal = Population {
+        name: "nominal".into(),
+        cases: 1,
+        fixed: vec![],
+        drawn: false,
+        scheme: Default::default(),
+    };
     let engines = definition.gimballed.len();
     let gimballed = match gimballed {
         "none" => vec![false; engines],
@@ -266,7 +272,7 @@ fn integrated(vehicle: &Vehicle, definition: &Definition) -> (Modal, String) {
 pub fn integrated_study() -> Study {
     let study = Study::new();
     study.edit("vehicles/sls-like/vehicle.toml", "damping_ratio = 0.005", "damping_ratio = 0.0");
-    let loaded = scenario::load(&study.path("runs/smoke.toml")).unwrap();
+    let loaded = scenario::load(&study.path("runs/smoke.toml"), scenario::Reach::Study).unwrap();
     let (modal, label) = integrated(&loaded.vehicle.vehicle, &loaded.definition);
     let folder = study.path("vehicles/sls-like/integrated");
     tvse::io::package::write(&folder, &modal, &Thresholds::default(), false).unwrap();
@@ -280,7 +286,8 @@ pub fn integrated_study() -> Study {
 #[test]
 fn the_reduced_and_the_integrated_reference_vehicle_have_the_same_poles() {
     let study = integrated_study();
-    let integrated = scenario::load(&study.path("runs/smoke.toml")).unwrap();
+    let integrated =
+        scenario::load(&study.path("runs/smoke.toml"), scenario::Reach::Study).unwrap();
     assert!(integrated.vehicle.vehicle.engines.iter().all(|engine| engine.in_modes));
     let reduced = loaded();
     let mut vehicle = reduced.vehicle.vehicle;

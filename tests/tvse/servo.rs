@@ -3,10 +3,10 @@
 
 use crate::study::{Said, Study};
 use nalgebra::{Complex, DMatrix};
-use tvse::campaign::{Evaluator, Population};
+use tvse::campaign::Evaluator;
 use tvse::dispersion::Sampler;
 use tvse::dynamics::{Model, Plant};
-use tvse::io::scenario;
+use tvse::io::scenario::{self, Reach};
 use tvse::modal::realisation::Realisation;
 
 /// Attitude and rate in three axes, a path behind others, a loop of paths, notches and a lag.
@@ -93,17 +93,15 @@ struct Seen {
 }
 
 fn seen(study: &Study) -> Vec<Seen> {
-    let loaded = scenario::load(&study.path("runs/smoke.toml")).unwrap();
+    let loaded = scenario::load(&study.path("runs/smoke.toml"), Reach::Study).unwrap();
     let mut definition = loaded.definition.clone();
     definition.modes.clear();
     definition.flight_times_s.truncate(1);
-    definition.populations =
-        vec![Population { name: "d".into(), cases: 2, fixed: vec![], drawn: true }];
     let sampler = Sampler::new(&loaded.dispersion, definition.seed);
     let vehicle = &loaded.vehicle.vehicle;
     let evaluator = Evaluator::new(vehicle, &sampler, &definition, false).unwrap();
     let mut all = Vec::new();
-    evaluator.visit(0, 1, |view| {
+    evaluator.visit(1, 1, |view| {
         assert!(view.evaluation.outcome.is_ok(), "{:?}", view.evaluation.outcome);
         all.push(Seen {
             plant: view.plant.clone(),
