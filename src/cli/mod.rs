@@ -14,7 +14,9 @@ pub mod how_many;
 pub mod import;
 pub mod init;
 pub mod interrupt;
+pub mod margins;
 pub mod merge;
+pub mod model;
 pub mod modes;
 pub mod nominal;
 pub mod outside;
@@ -23,6 +25,7 @@ pub mod plan;
 pub mod planar;
 pub mod progress;
 pub mod replay;
+pub mod response;
 pub mod retry;
 pub mod run;
 pub mod schema;
@@ -65,6 +68,7 @@ enum Command {
     Check(check::Args),
     Plan(plan::Args),
     Modes(modes::Args),
+    Model(model::Args),
     Import(import::Args),
     Nominal(nominal::Args),
     Run(run::Args),
@@ -78,8 +82,10 @@ enum Command {
     Compare(compare::Args),
     Gate(gate::Args),
     Replay(replay::Args),
+    Response(response::Args),
     HowMany(how_many::Args),
     Planar(planar::Args),
+    Margins(margins::Args),
     Actuator(actuator::Args),
     Schema(schema::Args),
     Completions(completions::Args),
@@ -127,6 +133,7 @@ pub fn run() -> ExitCode {
         Command::Check(args) => check::run(args, &mut out),
         Command::Plan(args) => plan::run(args, &mut out),
         Command::Modes(args) => modes::run(args, &mut out),
+        Command::Model(args) => model::run(args, &mut out),
         Command::Import(args) => import::run(args, &mut out),
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),
@@ -140,8 +147,10 @@ pub fn run() -> ExitCode {
         Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
+        Command::Response(args) => response::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),
+        Command::Margins(args) => margins::run(args, &mut out),
         Command::Actuator(args) => actuator::run(args, &mut out),
         Command::Schema(args) => schema::run(args, &mut out),
         Command::Completions(args) => completions::run(args, &mut out),

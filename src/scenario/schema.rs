@@ -90,7 +90,8 @@ mod tests {
         let good: Value = Value::Table(text.parse().unwrap());
         assert_eq!(keys::<T>(&good), Vec::<String>::new());
         let mut missed = 0;
-        for path in tables(&good, "") {
+        // The inputs of a path are signals by name: any key will do.
+        for path in tables(&good, "").into_iter().filter(|path| !path.ends_with("/input")) {
             let table = at(&mut good.clone(), &path).clone();
             for key in table.keys() {
                 let mut changed = good.clone();
