@@ -21,10 +21,11 @@ const LAYERS: [&[&str]; 10] = [
 ];
 
 /// Third parties and the modules that may name them.
-const WALLS: [(&str, &[&str]); 8] = [
+const WALLS: [(&str, &[&str]); 9] = [
     ("faer::linalg", &["modal", "structure"]),
     ("arrow::", &["io"]),
     ("parquet::", &["io"]),
+    ("hdf5_reader::", &["fem"]),
     ("clap::", &["cli"]),
     ("rayon::", &["campaign"]),
     ("rand::", &["dispersion"]),

@@ -140,6 +140,14 @@ impl Definition {
         }
     }
 
+    /// Takes away the number of drawn cases, where it does not change a case: what is left is common to
+    /// all parts and lengths of a campaign.
+    pub fn leave_cases_open(&mut self) {
+        for p in self.populations.iter_mut().filter(|p| p.drawn && p.scheme.keeps_first_cases()) {
+            p.cases = 0;
+        }
+    }
+
     /// Sets the number of cases of the dispersed population and of every corner's Monte Carlo;
     /// designs keep their own number.
     pub fn set_cases(&mut self, cases: u64) {

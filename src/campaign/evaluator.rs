@@ -134,6 +134,8 @@ impl Buffers {
 pub struct View<'a> {
     /// Plant of the evaluation.
     pub plant: &'a Plant,
+    /// The drawn vehicle; meaningless where the draw failed.
+    pub drawn: &'a DrawnVehicle,
     /// Model of the evaluation; meaningless where the draw failed.
     pub model: &'a Model,
     /// What was found.
@@ -206,7 +208,8 @@ impl<'a> Evaluator<'a> {
                 let null_poles = buffers.model.null_states.len();
                 let mut evaluation =
                     Evaluation { variant, flight_time, null_poles, outcome, loops: None };
-                look(&View { plant, model: &buffers.model, evaluation: &evaluation });
+                let model = &buffers.model;
+                look(&View { plant, drawn: vehicle, model, evaluation: &evaluation });
                 evaluation.loops = self.loops(at, variant, &drawn, vehicle, all_buffers, poles);
                 evaluations.push(evaluation);
             }

@@ -16,6 +16,7 @@ pub mod init;
 pub mod interrupt;
 pub mod margins;
 pub mod merge;
+pub mod model;
 pub mod modes;
 pub mod nominal;
 pub mod outside;
@@ -67,6 +68,7 @@ enum Command {
     Check(check::Args),
     Plan(plan::Args),
     Modes(modes::Args),
+    Model(model::Args),
     Import(import::Args),
     Nominal(nominal::Args),
     Run(run::Args),
@@ -131,6 +133,7 @@ pub fn run() -> ExitCode {
         Command::Check(args) => check::run(args, &mut out),
         Command::Plan(args) => plan::run(args, &mut out),
         Command::Modes(args) => modes::run(args, &mut out),
+        Command::Model(args) => model::run(args, &mut out),
         Command::Import(args) => import::run(args, &mut out),
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),

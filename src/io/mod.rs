@@ -1,5 +1,6 @@
 //! Input and output: the only module that touches the disk.
 
+pub mod actuator;
 mod assemble;
 pub mod column;
 mod envelope;
@@ -13,6 +14,7 @@ pub mod listed;
 pub mod lock;
 pub mod maker;
 pub mod manifest;
+pub mod model;
 pub mod package;
 pub mod plan;
 pub mod replay;

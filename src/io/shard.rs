@@ -32,6 +32,9 @@ const LARGEST: u64 = 2 << 30;
 const MOST_ROWS: u64 = 64 << 10;
 /// Cells of the `cases` table after which a shard ends.
 const MOST_CELLS: u64 = 1 << 20;
+/// Cases after which a shard ends: soon enough that a long campaign takes no more memory than a
+/// short one.
+const MOST_CASES: u64 = 8192;
 
 /// What a shard holds, in its first line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -124,7 +127,7 @@ impl Filling {
         }
         let rows = schema::cases(outline);
         let tables = TableName::of_cases(outline);
-        let most_cases = (MOST_CELLS / rows.len() as u64).max(1);
+        let most_cases = (MOST_CELLS / rows.len() as u64).clamp(1, MOST_CASES);
         Ok(Self {
             population,
             cases: first..first,

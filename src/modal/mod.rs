@@ -3,6 +3,7 @@
 pub mod eigen;
 pub mod identify;
 pub mod response;
+pub mod realisation;
 
 pub use eigen::{Pair, Solver};
 pub use identify::{Candidate, Identity, Reference};

@@ -3,7 +3,7 @@
 use crate::study::{Study, said};
 use std::path::Path;
 
-const COMMANDS: [&str; 14] = [
+const COMMANDS: [&str; 15] = [
     "init",
     "check",
     "plan",
@@ -16,6 +16,7 @@ const COMMANDS: [&str; 14] = [
     "how-many",
     "planar",
     "actuator",
+    "model",
     "schema",
     "completions",
 ];
