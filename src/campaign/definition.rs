@@ -110,10 +110,18 @@ pub struct Definition {
 }
 
 impl Definition {
-    /// Adds cases to the dispersed population and to every corner's Monte Carlo.
+    /// The definition without the numbers of cases that may grow while the first cases stay.
+    pub fn open_ended(&self) -> Self {
+        let mut open = self.clone();
+        let free = |p: &&mut Population| p.drawn && p.scheme.keeps_first_cases();
+        open.populations.iter_mut().filter(free).for_each(|p| p.cases = 0);
+        open
+    }
+
+    /// Adds cases to the dispersed population and to every corner's Monte Carlo, whose plans have
+    /// been asked whether they can be extended.
     pub fn add_cases(&mut self, more: u64) {
-        let free = |p: &&mut Population| p.drawn && !p.scheme.has_own_cases();
-        for population in self.populations.iter_mut().filter(free) {
+        for population in self.populations.iter_mut().filter(|p| p.drawn) {
             population.cases = population.cases.saturating_add(more).min(MOST_CASES);
         }
     }

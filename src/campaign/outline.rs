@@ -103,8 +103,8 @@ impl Outline {
 
     /// Digest of all but the number of drawn cases: what two parts of one campaign have in common.
     pub fn identity(&self) -> String {
-        let mut open = self.clone();
-        open.definition.set_cases(0);
+        let definition = self.definition.open_ended();
+        let open = Self { definition, ..self.clone() };
         let text = serde_json::to_string(&open).expect("an outline has text keys only");
         blake3::hash(text.as_bytes()).to_hex().to_string()
     }
@@ -112,8 +112,8 @@ impl Outline {
     /// What differs from another outline apart from the number of drawn cases: name, here, there.
     pub fn differences(&self, other: &Self) -> Vec<(String, String, String)> {
         let open = |outline: &Self| {
-            let mut open = outline.clone();
-            open.definition.set_cases(0);
+            let definition = outline.definition.open_ended();
+            let mut open = Self { definition, ..outline.clone() };
             let inputs = std::mem::take(&mut open.inputs);
             let value = serde_json::to_value(&open).expect("an outline has text keys only");
             let mut found = BTreeMap::new();
