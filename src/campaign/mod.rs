@@ -5,6 +5,8 @@ pub mod definition;
 pub mod draw;
 mod draw_servo;
 pub mod evaluator;
+pub mod loop_metric;
+pub mod loops;
 pub mod metric;
 pub mod nested;
 pub mod outline;
@@ -20,7 +22,7 @@ pub mod summary;
 #[cfg(test)]
 pub mod synthetic;
 
-pub use definition::{Definition, NozzleJet, Population, Slope, Variant};
+pub use definition::{Definition, LoopPlan, NozzleJet, Population, Slope, Variant};
 pub use evaluator::Evaluator;
 pub use outline::{DrawColumn, Input, Outline, StoredPoles};
 pub use pool::{Pool, Progress, Span};

@@ -41,6 +41,7 @@ pub fn definition(cases: &[u64]) -> Definition {
         modes: vec!["tvse".to_owned(), "bending".to_owned()],
         gimballed: vec![true, true],
         exchange_ratio: 0.5,
+        margins: None,
     }
 }
 
@@ -91,7 +92,13 @@ pub fn evaluate(
                 }
                 _ => Ok(poles(definition, variant, case, stored, &mut random)),
             };
-            evaluations.push(Evaluation { variant, flight_time, null_poles: 0, outcome });
+            evaluations.push(Evaluation {
+                variant,
+                flight_time,
+                null_poles: 0,
+                outcome,
+                loops: None,
+            });
         }
     }
     Record {

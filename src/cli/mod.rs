@@ -14,6 +14,7 @@ pub mod how_many;
 pub mod import;
 pub mod init;
 pub mod interrupt;
+pub mod margins;
 pub mod merge;
 pub mod model;
 pub mod modes;
@@ -24,6 +25,7 @@ pub mod plan;
 pub mod planar;
 pub mod progress;
 pub mod replay;
+pub mod response;
 pub mod retry;
 pub mod run;
 pub mod schema;
@@ -38,6 +40,7 @@ pub use error::Error;
 
 use crate::campaign::pool;
 use clap::{Parser, Subcommand};
+use std::borrow::Cow;
 use std::io::{self, ErrorKind, StdoutLock, Write};
 use std::process::ExitCode;
 
@@ -80,8 +83,10 @@ enum Command {
     Compare(compare::Args),
     Gate(gate::Args),
     Replay(replay::Args),
+    Response(response::Args),
     HowMany(how_many::Args),
     Planar(planar::Args),
+    Margins(margins::Args),
     Actuator(actuator::Args),
     Schema(schema::Args),
     Completions(completions::Args),
@@ -93,12 +98,25 @@ struct Output(StdoutLock<'static>);
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        unless_closed(self.0.write(bytes), bytes.len())
+        let written = match harmless(bytes) {
+            Cow::Borrowed(bytes) => self.0.write(bytes),
+            Cow::Owned(instead) => self.0.write_all(&instead).map(|()| bytes.len()),
+        };
+        unless_closed(written, bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
         unless_closed(self.0.flush(), ())
     }
+}
+
+/// Names and messages come from files of others, too: what would steer a terminal is shown as `?`.
+fn harmless(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let steers = |byte: &u8| byte.is_ascii_control() && !b"\n\t".contains(byte);
+    if !bytes.iter().any(steers) {
+        return Cow::Borrowed(bytes);
+    }
+    bytes.iter().map(|byte| if steers(byte) { b'?' } else { *byte }).collect()
 }
 
 fn unless_closed<T>(result: io::Result<T>, closed: T) -> io::Result<T> {
@@ -143,8 +161,10 @@ pub fn run() -> ExitCode {
         Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
+        Command::Response(args) => response::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),
+        Command::Margins(args) => margins::run(args, &mut out),
         Command::Actuator(args) => actuator::run(args, &mut out),
         Command::Schema(args) => schema::run(args, &mut out),
         Command::Completions(args) => completions::run(args, &mut out),
@@ -157,4 +177,16 @@ pub fn run() -> ExitCode {
         }
     };
     ExitCode::from(code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_would_steer_a_terminal_is_shown_instead_of_obeyed() {
+        let text = "a\tb | ζ\n";
+        assert!(matches!(harmless(text.as_bytes()), Cow::Borrowed(_)));
+        assert_eq!(&*harmless(b"red \x1b[31m\r\x07"), b"red ?[31m??");
+    }
 }

@@ -3,6 +3,7 @@
 pub mod actuator;
 mod assemble;
 pub mod column;
+mod envelope;
 mod fault;
 pub mod files;
 pub mod flat;
@@ -17,6 +18,7 @@ pub mod model;
 pub mod package;
 pub mod plan;
 pub mod replay;
+pub mod response;
 pub mod results;
 pub mod run;
 pub mod scaffold;
