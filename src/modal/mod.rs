@@ -2,8 +2,8 @@
 
 pub mod eigen;
 pub mod identify;
-pub mod response;
 pub mod realisation;
+pub mod response;
 
 pub use eigen::{Pair, Solver};
 pub use identify::{Candidate, Identity, Reference};
