@@ -5,6 +5,7 @@ pub mod definition;
 pub mod draw;
 mod draw_servo;
 pub mod evaluator;
+pub mod feedback;
 pub mod loop_metric;
 pub mod loops;
 pub mod metric;
