@@ -132,10 +132,10 @@ pub struct Definition {
 }
 
 impl Definition {
-    /// Adds cases to the dispersed population and to every corner's Monte Carlo.
+    /// Adds cases to the dispersed population and to every corner's Monte Carlo, whose plans have
+    /// been asked whether they can be extended.
     pub fn add_cases(&mut self, more: u64) {
-        let free = |p: &&mut Population| p.drawn && !p.scheme.has_own_cases();
-        for population in self.populations.iter_mut().filter(free) {
+        for population in self.populations.iter_mut().filter(|p| p.drawn) {
             population.cases = population.cases.saturating_add(more).min(MOST_CASES);
         }
     }

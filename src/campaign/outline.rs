@@ -113,7 +113,7 @@ impl Outline {
     pub fn differences(&self, other: &Self) -> Vec<(String, String, String)> {
         let open = |outline: &Self| {
             let mut open = outline.clone();
-            open.definition.set_cases(0);
+            open.definition.leave_cases_open();
             let inputs = std::mem::take(&mut open.inputs);
             let value = serde_json::to_value(&open).expect("an outline has text keys only");
             let mut found = BTreeMap::new();

@@ -40,6 +40,7 @@ pub use error::Error;
 
 use crate::campaign::pool;
 use clap::{Parser, Subcommand};
+use std::borrow::Cow;
 use std::io::{self, ErrorKind, StdoutLock, Write};
 use std::process::ExitCode;
 
@@ -97,12 +98,25 @@ struct Output(StdoutLock<'static>);
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        unless_closed(self.0.write(bytes), bytes.len())
+        let written = match harmless(bytes) {
+            Cow::Borrowed(bytes) => self.0.write(bytes),
+            Cow::Owned(instead) => self.0.write_all(&instead).map(|()| bytes.len()),
+        };
+        unless_closed(written, bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
         unless_closed(self.0.flush(), ())
     }
+}
+
+/// Names and messages come from files of others, too: what would steer a terminal is shown as `?`.
+fn harmless(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let steers = |byte: &u8| byte.is_ascii_control() && !b"\n\t".contains(byte);
+    if !bytes.iter().any(steers) {
+        return Cow::Borrowed(bytes);
+    }
+    bytes.iter().map(|byte| if steers(byte) { b'?' } else { *byte }).collect()
 }
 
 fn unless_closed<T>(result: io::Result<T>, closed: T) -> io::Result<T> {
@@ -163,4 +177,16 @@ pub fn run() -> ExitCode {
         }
     };
     ExitCode::from(code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_would_steer_a_terminal_is_shown_instead_of_obeyed() {
+        let text = "a\tb | ζ\n";
+        assert!(matches!(harmless(text.as_bytes()), Cow::Borrowed(_)));
+        assert_eq!(&*harmless(b"red \x1b[31m\r\x07"), b"red ?[31m??");
+    }
 }

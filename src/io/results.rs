@@ -88,7 +88,10 @@ impl Results {
         let mut store = match opening {
             Opening::New => Store::begin(folder, outline, inputs, access)?,
             Opening::Resume { cases } => Store::resume(folder, outline, cases, inputs, access)?,
-            Opening::Extend(_) => Store::resume(folder, outline, false, None, access)?,
+            Opening::Extend(_) => {
+                Store::refuse_none(folder)?;
+                Store::resume(folder, outline, false, None, access)?
+            }
         };
         if let Opening::Extend(more) = opening {
             store.extend(more)?;

@@ -201,6 +201,7 @@ impl Filling {
         let text = serde_json::to_string(&header).expect("a header has text keys only");
         let first = format!("{MAGIC}{} {text}\n", files::digest_of(text.as_bytes()));
         let mut aside = Aside::within(run, &path)?;
+        files::ensure_folder(&run.join(FOLDER))?;
         let mut bytes = vec![first.as_bytes()];
         bytes.extend(parts.iter().map(|(_, (bytes, _))| bytes.as_slice()));
         for bytes in bytes {

@@ -93,8 +93,7 @@ impl Store {
         access: Access,
     ) -> Result<Self, Problems> {
         files::create_folder(folder)?;
-        let made = || Self::start(folder, outline, inputs, access);
-        made().inspect_err(|_| remove_unstarted(folder))
+        Self::start(folder, outline, inputs, access).inspect_err(|_| files::remove_if_empty(folder))
     }
 
     fn start(
@@ -104,9 +103,25 @@ impl Store {
         access: Access,
     ) -> Result<Self, Problems> {
         let locks = locked(folder, access)?;
-        if access == Access::Whole {
+        // Alone under the lock, a start that fails leaves nothing; others may need what a part wrote.
+        let alone = access == Access::Whole;
+        if alone {
             files::sweep(folder);
         }
+        Self::write_start(folder, outline, inputs, access, locks).inspect_err(|_| {
+            if alone {
+                remove_unstarted(folder);
+            }
+        })
+    }
+
+    fn write_start(
+        folder: &Path,
+        outline: Outline,
+        inputs: Option<&Inputs>,
+        access: Access,
+        locks: Vec<Lock>,
+    ) -> Result<Self, Problems> {
         if let Some(inputs) = inputs {
             inputs.write(folder)?;
         }
@@ -129,7 +144,6 @@ impl Store {
         access: Access,
         locks: Vec<Lock>,
     ) -> Result<Self, Problems> {
-        files::ensure_folder(&folder.join(shard::FOLDER))?;
         let identity = outline.identity();
         let stale = locks.iter().filter_map(|lock| lock.stale.as_ref());
         let mended = stale.map(|by| format!("took over the stale lock of {}", by.name())).collect();
@@ -173,6 +187,17 @@ impl Store {
         store.with_shards(true)
     }
 
+    /// Refuses a folder that holds no run.
+    ///
+    /// # Errors
+    /// An input problem that says so.
+    pub fn refuse_none(folder: &Path) -> Result<(), Problems> {
+        match look(folder)? {
+            Found::Nothing => Err(no_run(folder)),
+            _ => Ok(()),
+        }
+    }
+
     /// Opens a run as it is, without its shards.
     fn open(folder: &Path, access: Access) -> Result<Self, Problems> {
         let locks = locked(folder, access)?;
@@ -181,11 +206,7 @@ impl Store {
             files::sweep(folder);
         }
         let (outline, maker, tables, extended) = match look(folder)? {
-            Found::Nothing => {
-                let found = "neither a finished run nor one under way";
-                let name = files::name(folder);
-                return Err(Problems::input(name, "", found, "the folder of a run"));
-            }
+            Found::Nothing => return Err(no_run(folder)),
             Found::Finished(manifest) => {
                 let maker = manifest.execution.maker.clone();
                 (manifest.run, maker, Some(Run::open(folder)?), false)
@@ -294,6 +315,8 @@ impl Store {
                     files::rename(&path, &path.with_extension("damaged"))?;
                     self.mended.push(format!("{found}; its cases are evaluated again"));
                 }
+                // Perhaps another part's: evaluated again if it is needed, and left to the merge.
+                Err(found) if mend => self.mended.push(format!("{found}; left as it is")),
                 Err(found) => problems.extend(found),
             }
         }
@@ -431,8 +454,11 @@ impl Drop for Store {
     fn drop(&mut self) {
         // A run of which nothing is evaluated leaves nothing behind.
         if self.access == Access::Whole {
-            files::remove_folder(&self.folder.join(NEXT).join(TABLES));
-            files::remove_folder(&self.folder.join(NEXT));
+            // What is made whole may be half in its place: the next process goes on with that.
+            if !self.folder.join(NEXT).join(manifest::FILE).is_file() {
+                files::remove_folder(&self.folder.join(NEXT));
+            }
+            files::remove_if_empty(&self.folder.join(shard::FOLDER));
             let none = files::names(&self.folder.join(shard::FOLDER)).is_ok_and(|n| n.is_empty());
             if self.tables.is_none() && self.shards.is_empty() && none {
                 remove_unstarted(&self.folder);
@@ -534,6 +560,11 @@ fn settle(folder: &Path) -> Result<(), Problems> {
     Ok(())
 }
 
+fn no_run(folder: &Path) -> Problems {
+    let found = "neither a finished run nor one under way";
+    Problems::input(files::name(folder), "", found, "the folder of a run")
+}
+
 /// What a folder holds of a run.
 fn look(folder: &Path) -> Result<Found, Problems> {
     let path = folder.join(STARTED);
@@ -618,10 +649,7 @@ impl Status {
 /// Input: no folder of a run. Damage: what says what it is cannot be read.
 pub fn status(folder: &Path) -> Result<Status, Problems> {
     let (finished, outline) = match look(folder)? {
-        Found::Nothing => {
-            let found = "neither a finished run nor one under way";
-            return Err(Problems::input(files::name(folder), "", found, "the folder of a run"));
-        }
+        Found::Nothing => return Err(no_run(folder)),
         Found::Finished(manifest) => (true, manifest.run),
         Found::Started(started) => (false, started.run),
     };

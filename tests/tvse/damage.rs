@@ -52,8 +52,8 @@ fn a_manifest_that_is_missing_cut_short_old_or_altered_is_named() {
         "[]",
         "null",
         &text[..text.len() / 2],
-        &text.replacen("\"schema_version\": 1", "\"schema_version\": 0", 1),
-        &text.replacen("\"schema_version\": 1", "\"schema_version\": \"1\"", 1),
+        &text.replacen("\"schema_version\": 2", "\"schema_version\": 0", 1),
+        &text.replacen("\"schema_version\": 2", "\"schema_version\": \"2\"", 1),
     ] {
         fs::write(&file, altered).unwrap();
         refused(&study, &["result/manifest.json: "]);
