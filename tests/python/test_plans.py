@@ -424,4 +424,5 @@ def test_threads_parts_and_extensions_give_the_same_bytes_or_are_refused(folder,
         done = subprocess.run([TVSE, "run", path, "-o", short, "--extend", "3"], capture_output=True, text=True)
         assert done.returncode == 2 and "multiple of 2" in done.stderr
     else:
-        assert done.returncode == 2 and "keeps its first cases" in done.stderr
+        assert done.returncode == 2
+        assert "keeps its first cases" in done.stderr or "populations" in done.stderr
