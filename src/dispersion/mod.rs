@@ -9,6 +9,7 @@ mod beta;
 pub mod draw;
 #[cfg(test)]
 pub(crate) mod fixture;
+pub mod gradient;
 pub mod law;
 pub mod normal;
 pub mod parameter;
@@ -19,6 +20,7 @@ pub mod stream;
 pub mod table;
 
 pub use draw::{Dispersion, Draw, Role, Shared};
+pub use gradient::AffineGradient;
 pub use law::{Bound, Law, Position};
 pub use parameter::{Affine, Parameters, Place, Quantity};
 pub use plan::Plan;
