@@ -2,6 +2,7 @@
 
 pub mod corner;
 pub mod definition;
+pub mod derivative;
 pub mod draw;
 mod draw_servo;
 pub mod evaluator;
@@ -15,7 +16,8 @@ pub mod summary;
 #[cfg(test)]
 pub mod synthetic;
 
-pub use definition::{Definition, NozzleJet, Population, Slope, Variant};
+pub use definition::{Definition, NozzleJet, Population, SensitivityRule, Slope, Variant};
+pub use derivative::Sensitivity;
 pub use evaluator::Evaluator;
 pub use outline::{DrawColumn, Input, Outline, StoredPoles};
 pub use pool::{Pool, Progress, Span};

@@ -34,11 +34,13 @@ impl Dispersion {
 
     /// The gradient by the independent score of every draw, from that by the effects on parameters.
     ///
-    /// A draw that stays nominal counts as one at its median. `None` where the value has no slope: a
-    /// discrete law, a value that its law cannot give.
+    /// A draw that stays nominal counts as one at its median; one of the `fixed` draws (index and value)
+    /// does not move with its common score. `None` where the value has no slope: a discrete law, a value
+    /// that its law cannot give.
     pub fn score_gradient(
         &self,
         draws: &Draws,
+        fixed: &[(usize, f64)],
         effects: &[AffineGradient],
     ) -> Vec<Option<Complex<f64>>> {
         let by_value = self.value_gradient(draws, effects);
@@ -52,14 +54,15 @@ impl Dispersion {
             };
             let slope = score.and_then(|score| draw.law.slope(&Position::of_score(score)));
             let by_score = slope.map(|slope| by_value[index] * slope);
+            let held = fixed.iter().any(|(fixed, _)| *fixed == index);
             found[index] = match common {
-                None => by_score,
-                Some(shared) => {
+                Some(shared) if !held => {
                     if let (Some(total), Some(by_score)) = (&mut found[shared.draw], by_score) {
                         *total += by_score * shared.weight;
                     }
                     by_score.map(|by_score| by_score * rest(shared.weight))
                 }
+                _ => by_score,
             };
         }
         found

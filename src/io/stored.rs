@@ -153,6 +153,7 @@ impl Run {
                         identity_confidence: number("identity_confidence", row),
                         participation: participation(row),
                         residual: number("residual", row),
+                        sensitivity: None,
                     })
                 }
                 Some(failed) => Err(Failure::new(

@@ -117,6 +117,7 @@ pub fn resolve(
             modes: file.modes.clone(),
             gimballed,
             exchange_ratio: file.identity.exchange_ratio,
+            sensitivity: None,
         },
         corners,
     }))
