@@ -14,7 +14,7 @@ const RUN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/runs/smoke.toml");
 const CASES: u64 = 1024;
 
 fn campaign(criterion: &mut Criterion) {
-    let mut loaded = io::scenario::load(Path::new(RUN)).expect("read");
+    let mut loaded = io::scenario::load(Path::new(RUN), io::scenario::Reach::Study).expect("read");
     loaded.definition.set_cases(CASES);
     let definition = &loaded.definition;
     let sampler = Sampler::new(&loaded.dispersion, definition.seed);

@@ -6,6 +6,7 @@ use std::hint::black_box;
 use tvse::campaign::{Definition, Evaluator, NozzleJet, Population, Slope, Variant};
 use tvse::dispersion::Sampler;
 use tvse::dynamics::Model;
+use tvse::io::scenario::Reach;
 use tvse::modal::{Solver, identify};
 use tvse::structure::{self, Selection, Stick};
 use tvse::vehicle::Vehicle;
@@ -16,7 +17,8 @@ const DISPERSION: &str = include_str!("../dispersions/reference.toml");
 
 /// The reference vehicle with this number of elastic modes; the mode of interest by frequency.
 fn vehicle(modes: usize) -> Vehicle {
-    let mut vehicle = tvse::io::scenario::vehicle(VEHICLE.as_ref()).expect("read").resolved.vehicle;
+    let mut vehicle =
+        tvse::io::scenario::vehicle(VEHICLE.as_ref(), Reach::Study).expect("read").resolved.vehicle;
     let stick = include_str!("../vehicles/sls-like/stick.toml");
     let stick = Stick::parse(stick, "stick.toml").expect("parsed");
     let thresholds = structure::Thresholds::default();
@@ -35,6 +37,7 @@ fn definition(vehicle: &Vehicle) -> Definition {
         cases,
         fixed: Vec::new(),
         drawn,
+        scheme: Default::default(),
     };
     Definition {
         name: "bench".to_owned(),

@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 const LAYERS: [&[&str]; 9] = [
     &["problem", "spelling", "stats"],
     &["vehicle"],
-    &["dynamics", "dispersion", "structure"],
-    &["modal"],
+    &["dynamics", "dispersion", "structure", "fem"],
+    &["modal", "import"],
     &["campaign"],
     &["gate"],
     &["scenario", "report"],

@@ -6,7 +6,7 @@
 use super::evaluator::{self, Evaluator};
 use super::pool::{Pool, spans};
 use super::{Definition, Population, Record};
-use crate::dispersion::{Dispersion, Sampler};
+use crate::dispersion::{Dispersion, Sampler, Scheme};
 use crate::vehicle::Vehicle;
 use std::convert::Infallible;
 use std::sync::atomic::AtomicBool;
@@ -53,6 +53,7 @@ pub fn adverse_sides(
             cases: 1,
             fixed: vec![(draw, value)],
             drawn: false,
+            scheme: Scheme::MonteCarlo,
         })
     };
     let trial = Definition {

@@ -1,6 +1,8 @@
 //! What a campaign is asked to do: cases, seed, flight times, variants and modes of interest.
 
+use crate::dispersion::Scheme;
 pub use crate::dynamics::{Feedback, NozzleJet};
+use crate::stats::Drawing;
 
 use serde::{Deserialize, Serialize};
 
@@ -60,6 +62,30 @@ pub struct Population {
     pub fixed: Vec<(usize, f64)>,
     /// Whether the keys that are not fixed are drawn; if not they stay nominal.
     pub drawn: bool,
+    /// How its cases come about, where they are drawn: independently unless said otherwise.
+    #[serde(default, skip_serializing_if = "Scheme::is_monte_carlo")]
+    pub scheme: Scheme,
+}
+
+impl Population {
+    /// The outer draw to which a case of a nested plan belongs.
+    pub fn outer(&self, case: u64) -> Option<u64> {
+        match self.scheme {
+            Scheme::Nested { inner, .. } => case.checked_div(inner),
+            _ => None,
+        }
+    }
+
+    /// The replicate to which a case belongs, where the plan has several.
+    pub fn replicate(&self, case: u64) -> Option<u64> {
+        let replicates = self.scheme.replicates();
+        (self.drawn && replicates > 1).then(|| case % replicates)
+    }
+
+    /// What may be concluded from its cases.
+    pub fn drawing(&self) -> Drawing {
+        if self.drawn { self.scheme.drawing() } else { Drawing::Designed }
+    }
 }
 
 /// A run definition, validated against its vehicle and dispersion.
@@ -109,14 +135,17 @@ impl SensitivityRule {
 impl Definition {
     /// Adds cases to the dispersed population and to every corner's Monte Carlo.
     pub fn add_cases(&mut self, more: u64) {
-        for population in self.populations.iter_mut().filter(|p| p.drawn) {
+        let free = |p: &&mut Population| p.drawn && !p.scheme.has_own_cases();
+        for population in self.populations.iter_mut().filter(free) {
             population.cases = population.cases.saturating_add(more).min(MOST_CASES);
         }
     }
 
-    /// Sets the number of cases of the dispersed population and of every corner's Monte Carlo.
+    /// Sets the number of cases of the dispersed population and of every corner's Monte Carlo;
+    /// designs keep their own number.
     pub fn set_cases(&mut self, cases: u64) {
-        for population in self.populations.iter_mut().filter(|p| p.drawn) {
+        let free = |p: &&mut Population| p.drawn && !p.scheme.has_own_cases();
+        for population in self.populations.iter_mut().filter(free) {
             population.cases = cases;
         }
     }

@@ -6,7 +6,9 @@
 use super::derivative::Place;
 use super::draw::Slots;
 use super::plant::Extent;
-use super::{Branch, Definition, Evaluation, Failure, FailureKind, Pole, Record, Variant};
+use super::{
+    Branch, Definition, Evaluation, Failure, FailureKind, Pole, Population, Record, Variant,
+};
 use crate::dispersion::{Affine, Cursor, Dispersion, Draws, Sampler};
 use crate::dynamics::{DrawnVehicle, Effects, Model, Part, Plant};
 use crate::modal::{self, Reference, Solver, eigen, identify};
@@ -23,6 +25,9 @@ const RESIDUAL_FACTOR: f64 = 1e3;
 /// Why an evaluator could not be prepared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
+    /// The sampler has another scheme than a population of the run.
+    #[error("the cases of population `{0}` come from another plan than the sampler's")]
+    Unplanned(String),
     /// A flight time of the run is not in the modal package.
     #[error("the modal package has no flight time {0} s")]
     MissingTime(f64),
@@ -170,6 +175,10 @@ impl<'a> Evaluator<'a> {
         definition: &'a Definition,
         all_poles: bool,
     ) -> Result<Self, Error> {
+        let planned = |p: &&Population| !p.scheme.is_monte_carlo() && p.scheme != *sampler.scheme();
+        if let Some(population) = definition.populations.iter().find(planned) {
+            return Err(Error::Unplanned(population.name.clone()));
+        }
         let times = definition
             .flight_times_s
             .par_iter()
@@ -196,7 +205,11 @@ impl<'a> Evaluator<'a> {
         let mut workspace = self.take();
         let Workspace { buffers, cursor, vehicle, poles } = &mut workspace;
         let rule = &self.definition.populations[population];
-        let draws = cursor.draw(case, &rule.fixed, rule.drawn);
+        let draws = if rule.scheme.is_monte_carlo() {
+            cursor.draw(case, &rule.fixed, rule.drawn)
+        } else {
+            cursor.draw_planned(case)
+        };
         let mut evaluations = Vec::new();
         for (flight_time, at) in self.times.iter().enumerate() {
             let parameters = self.sampler.dispersion().parameters();

@@ -7,14 +7,20 @@ pub mod draw;
 mod draw_servo;
 pub mod evaluator;
 pub mod metric;
+pub mod nested;
 pub mod outline;
+pub mod planar;
 pub mod plant;
 pub mod pool;
 pub mod record;
 pub mod row;
+pub mod sample;
+pub mod sensitivity;
+pub mod statistics;
 pub mod summary;
 #[cfg(test)]
 pub mod synthetic;
+pub mod worst;
 
 pub use definition::{Definition, NozzleJet, Population, SensitivityRule, Slope, Variant};
 pub use derivative::Sensitivity;
@@ -22,3 +28,4 @@ pub use evaluator::Evaluator;
 pub use outline::{DrawColumn, Input, Outline, StoredPoles};
 pub use pool::{Pool, Progress, Span};
 pub use record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};
+pub use sample::Sample;

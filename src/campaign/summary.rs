@@ -5,14 +5,13 @@
 //! number; where they are read from is decided in `io`.
 
 use super::definition::Definition;
+use super::nested::{Nested, OuterDraws, Statement};
+use super::sample::{CONFIDENCE, Intervals, Sample, ends};
 use crate::stats::{
-    Confidence, Drawing, Error, Estimate, Probability, RunningMoments, Selection, Sides,
-    clopper_pearson, quantile_of,
+    Confidence, Drawing, Error, Moments, Probability, RunningMoments, Selection, Sides,
+    clopper_pearson, interval_ranks, of_replicates, quantile_of,
 };
 use std::f64::consts::LN_2;
-
-/// Confidence of the intervals of the summary.
-pub const CONFIDENCE: f64 = 0.95;
 
 /// Levels of the quantiles of the damping ratio and the words for them in column names, in percent;
 /// 0.135 % and 99.865 % lie three standard deviations from the mean of a normal law.
@@ -37,6 +36,8 @@ pub struct Group {
     pub mode: usize,
     /// Index of the flight time; none if each case is reduced to its worst over the flight times.
     pub flight_time: Option<usize>,
+    /// Index of the outer draw of a nested plan; none for all cases of the population.
+    pub outer: Option<u64>,
 }
 
 /// What was found for a case of a group; NaN where there is nothing, as after a failure.
@@ -77,12 +78,16 @@ impl Found {
 pub struct Spread {
     /// Mean.
     pub mean: f64,
+    /// Its interval.
+    pub mean_interval: Option<[f64; 2]>,
     /// Sample standard deviation; none for a single case.
     pub standard_deviation: Option<f64>,
     /// Least value.
     pub smallest: f64,
     /// Quantiles at [`LEVELS`], linear between order statistics (type 7 of Hyndman and Fan).
     pub quantiles: [f64; LEVELS.len()],
+    /// Their intervals; an infinite end is not known.
+    pub quantile_intervals: [Option<[f64; 2]>; LEVELS.len()],
     /// Greatest value.
     pub largest: f64,
 }
@@ -98,10 +103,12 @@ pub struct SummaryRow {
     pub failures: u64,
     /// Cases with a pole in the right half plane.
     pub unstable: u64,
-    /// Share of unstable cases among those with a result; none if there are none.
+    /// Share of the cases that are unstable or failed; none if no case has a result.
     pub share_unstable: Option<f64>,
-    /// Its exact binomial interval; none for cases that are not independent draws.
+    /// Its interval; none for cases from which none follows.
     pub share_unstable_interval: Option<[f64; 2]>,
+    /// Where the intervals of the row come from.
+    pub intervals: Intervals,
     /// Damping ratios; none if no case has a result.
     pub damping_ratio: Option<Spread>,
     /// Mean frequency, Hz.
@@ -110,6 +117,12 @@ pub struct SummaryRow {
     pub time_to_double_min_s: Option<f64>,
     /// Least and mean gain of damping ratio over the first variant on the same draws.
     pub damping_ratio_gain: Option<[f64; 2]>,
+    /// Interval of the mean gain.
+    pub gain_mean_interval: Option<[f64; 2]>,
+    /// What the outer draws show, of all cases of a nested plan.
+    pub outer: Option<OuterDraws>,
+    /// The statement on this outer draw.
+    pub statement: Option<Statement>,
 }
 
 /// Sums up one group from its cases, which pass by in the order of their index, several times if
@@ -117,8 +130,10 @@ pub struct SummaryRow {
 #[derive(Debug, Clone)]
 pub struct Tally {
     group: Group,
-    drawn: bool,
+    sample: Sample,
     first_pass: bool,
+    /// Cases taken in this pass.
+    taken: u64,
     cases: u64,
     unstable: u64,
     pole_re_max: f64,
@@ -127,16 +142,25 @@ pub struct Tally {
     gain: RunningMoments,
     gain_min: f64,
     order: Selection,
+    /// The replicates among which cases take turns; none if there is one.
+    replicates: Vec<Self>,
+    /// The outer draws of a nested plan.
+    nested: Option<Nested>,
 }
 
 impl Tally {
-    /// A tally of no cases that holds about `most` values; `drawn` says whether the cases of the
-    /// group are independent draws.
-    pub fn new(group: Group, drawn: bool, most: usize) -> Self {
+    /// A tally of no cases, which come about as `sample` says, that holds about `most` values.
+    pub fn new(group: Group, sample: Sample, most: usize) -> Self {
+        let count = sample.turning();
+        let part = || Self::new(group, Sample::turns(Drawing::Designed, 1), most / count);
+        let replicates = if count > 1 { (0..count).map(|_| part()).collect() } else { Vec::new() };
         Self {
             group,
-            drawn,
+            sample,
+            replicates,
+            nested: sample.nested().map(|nested| Nested::new(group, nested)),
             first_pass: true,
+            taken: 0,
             cases: 0,
             unstable: 0,
             pole_re_max: f64::NEG_INFINITY,
@@ -168,6 +192,14 @@ impl Tally {
         if !found.damping_ratio.is_nan() {
             self.order.push(found.damping_ratio);
         }
+        if !self.replicates.is_empty() {
+            let turn = self.taken % self.replicates.len() as u64;
+            self.replicates[turn as usize].add(found)?;
+        }
+        if let Some(nested) = self.nested.as_mut().filter(|_| self.first_pass) {
+            nested.add(found)?;
+        }
+        self.taken += 1;
         Ok(())
     }
 
@@ -177,6 +209,7 @@ impl Tally {
     /// None: the levels are levels.
     pub fn end_pass(&mut self) -> Result<bool, Error> {
         self.first_pass = false;
+        self.taken = 0;
         let count = self.order.count();
         let mut ranks = vec![0, count.saturating_sub(1)];
         if count > 0 {
@@ -187,7 +220,92 @@ impl Tally {
                 });
             }
         }
-        Ok(self.order.end_pass(&ranks))
+        for interval in self.interval_ranks()?.into_iter().flatten().flatten() {
+            ranks.extend(interval);
+        }
+        let mut done = self.order.end_pass(&ranks);
+        for replicate in &mut self.replicates {
+            done &= replicate.end_pass()?;
+        }
+        Ok(done)
+    }
+
+    /// Ranks among the known values of the ends of the intervals of the quantiles; none for an end
+    /// beyond them. Failed cases may lie anywhere: beyond every value for the end on either side.
+    fn interval_ranks(&self) -> Result<Option<[[Option<u64>; 2]; LEVELS.len()]>, Error> {
+        let Ok(independent) = self.sample.drawing().independent() else { return Ok(None) };
+        let (known, failures) = (self.order.count(), self.failures());
+        let confidence = Confidence::new(CONFIDENCE)?;
+        let mut ranks = [[None; 2]; LEVELS.len()];
+        for (ranks, (level, _)) in ranks.iter_mut().zip(LEVELS) {
+            let level = Probability::new(level)?;
+            let [low, high] = interval_ranks(self.cases, level, confidence, independent);
+            *ranks = [
+                low.and_then(|rank| rank.checked_sub(failures)),
+                high.filter(|rank| *rank < known),
+            ];
+        }
+        Ok((known > 0).then_some(ranks))
+    }
+
+    fn failures(&self) -> u64 {
+        self.cases - self.order.count()
+    }
+
+    /// Cases that are unstable or failed.
+    pub(super) fn bad(&self) -> u64 {
+        self.unstable + self.failures()
+    }
+
+    /// Cases so far.
+    pub(super) fn cases(&self) -> u64 {
+        self.cases
+    }
+
+    /// Means of damping ratio and gain of the cases that have them.
+    pub(super) fn means(&self) -> [Option<f64>; 2] {
+        [&self.damping, &self.gain].map(|values| values.moments().mean())
+    }
+
+    /// The interval over replicates or outer draws of a statistic of each, where it follows.
+    fn over_replicates(&self, values: Option<Vec<f64>>) -> Option<[f64; 2]> {
+        let values = values?;
+        let drawing = self.sample.drawing();
+        let independent = drawing.independent_replicates(values.len() as u64).ok()?;
+        let confidence = Confidence::new(CONFIDENCE).ok()?;
+        of_replicates(&values, confidence, independent).ok().map(ends)
+    }
+
+    /// The interval of a mean: `place` is its place in [`Tally::means`].
+    fn mean_interval(&self, moments: Moments, place: usize) -> Option<[f64; 2]> {
+        if let Ok(independent) = self.sample.drawing().independent() {
+            let confidence = Confidence::new(CONFIDENCE).ok()?;
+            return moments.mean_interval(confidence, Sides::Two, independent).ok().map(ends);
+        }
+        self.over_replicates(match &self.nested {
+            Some(nested) => nested.means(place),
+            None => self.replicates.iter().map(|tally| tally.means()[place]).collect(),
+        })
+    }
+
+    fn share_interval(&self) -> Result<Option<[f64; 2]>, Error> {
+        if let Ok(independent) = self.sample.drawing().independent() {
+            let confidence = Confidence::new(CONFIDENCE)?;
+            let (bad, cases) = (self.bad(), self.cases);
+            let share = clopper_pearson(bad, cases, confidence, Sides::Two, independent)?;
+            return Ok(Some(ends(share)));
+        }
+        let share = |tally: &Self| tally.bad() as f64 / tally.cases as f64;
+        let found = self.over_replicates(Some(match &self.nested {
+            Some(nested) => nested.shares(),
+            None => self.replicates.iter().map(share).collect(),
+        }));
+        Ok(found.map(|ends| ends.map(|end| end.clamp(0.0, 1.0))))
+    }
+
+    /// The rows of the outer draws of a nested plan, whose cases are reduced over the flight times.
+    pub fn outer_rows(&self) -> &[SummaryRow] {
+        self.nested.as_ref().map_or(&[], |nested| nested.rows())
     }
 
     /// The row of the summary, once the last pass has ended.
@@ -196,29 +314,53 @@ impl Tally {
     /// What `stats` says.
     pub fn row(&self) -> Result<SummaryRow, Error> {
         let evaluated = self.order.count();
-        let drawing = if self.drawn { Drawing::Independent } else { Drawing::Designed };
-        let interval = match drawing.independent() {
-            Ok(independent) if evaluated > 0 => {
-                let confidence = Confidence::new(CONFIDENCE)?;
-                let unstable = self.unstable;
-                let share =
-                    clopper_pearson(unstable, evaluated, confidence, Sides::Two, independent)?;
-                Some([Estimate::lower(&share), Estimate::upper(&share)])
-            }
-            _ => None,
-        };
+        let shown = evaluated > 0;
+        let drawing = self.sample.drawing();
+        let replicates = self.sample.replicates(self.cases as usize) as u64;
         Ok(SummaryRow {
             group: self.group,
             cases: self.cases,
-            failures: self.cases - evaluated,
+            failures: self.failures(),
             unstable: self.unstable,
-            share_unstable: (evaluated > 0).then(|| self.unstable as f64 / evaluated as f64),
-            share_unstable_interval: interval,
+            share_unstable: shown.then(|| self.bad() as f64 / self.cases as f64),
+            share_unstable_interval: if shown { self.share_interval()? } else { None },
+            intervals: if drawing.independent().is_ok() {
+                Intervals::Independent
+            } else if drawing.independent_replicates(replicates).is_ok() {
+                Intervals::Replicates
+            } else {
+                Intervals::None
+            },
             damping_ratio: self.spread()?,
             frequency_hz_mean: self.frequency.moments().mean(),
             time_to_double_min_s: (self.pole_re_max > 0.0).then(|| LN_2 / self.pole_re_max),
             damping_ratio_gain: self.gain.moments().mean().map(|mean| [self.gain_min, mean]),
+            gain_mean_interval: self.mean_interval(self.gain.moments(), 1),
+            outer: self.nested.as_ref().map(Nested::outer_draws).transpose()?,
+            statement: None,
         })
+    }
+
+    fn quantile(&self, level: Probability) -> Option<f64> {
+        let count = self.order.count();
+        (count > 0).then(|| quantile_of(count, level, |rank| self.order.value(rank)))
+    }
+
+    fn quantile_intervals(&self) -> Result<[Option<[f64; 2]>; LEVELS.len()], Error> {
+        let mut intervals = [None; LEVELS.len()];
+        if let Some(ranks) = self.interval_ranks()? {
+            for (interval, [low, high]) in intervals.iter_mut().zip(ranks) {
+                let end = |rank: Option<u64>, beyond| rank.map_or(beyond, |r| self.order.value(r));
+                *interval = Some([end(low, f64::NEG_INFINITY), end(high, f64::INFINITY)]);
+            }
+        } else if !self.replicates.is_empty() {
+            for (interval, (level, _)) in intervals.iter_mut().zip(LEVELS) {
+                let level = Probability::new(level)?;
+                let each = self.replicates.iter().map(|tally| tally.quantile(level));
+                *interval = self.over_replicates(each.collect());
+            }
+        }
+        Ok(intervals)
     }
 
     fn spread(&self) -> Result<Option<Spread>, Error> {
@@ -231,20 +373,22 @@ impl Tally {
         }
         Ok(Some(Spread {
             mean,
+            mean_interval: self.mean_interval(moments, 0),
             standard_deviation: moments.standard_deviation(),
             smallest: self.order.value(0),
             quantiles,
+            quantile_intervals: self.quantile_intervals()?,
             largest: self.order.value(count - 1),
         }))
     }
 }
 
-/// Sums up one group whose cases are at hand; `drawn` says whether they are independent draws.
+/// Sums up one group whose cases are at hand.
 ///
 /// # Errors
 /// None for numbers that are finite or NaN; else what `stats` says of them.
-pub fn summarise(group: Group, drawn: bool, cases: &[Found]) -> Result<SummaryRow, Error> {
-    let mut tally = Tally::new(group, drawn, usize::MAX);
+pub fn summarise(group: Group, sample: Sample, cases: &[Found]) -> Result<SummaryRow, Error> {
+    let mut tally = Tally::new(group, sample, usize::MAX);
     cases.iter().try_for_each(|found| tally.add(found))?;
     tally.end_pass()?;
     tally.row()
@@ -258,7 +402,7 @@ pub fn groups(definition: &Definition, population: usize) -> Vec<Group> {
     for variant in 0..definition.variants.len() {
         for flight_time in (0..times).map(Some).chain([None]) {
             for mode in 0..definition.modes.len() {
-                groups.push(Group { population, variant, mode, flight_time });
+                groups.push(Group { population, variant, mode, flight_time, outer: None });
             }
         }
     }
@@ -324,9 +468,12 @@ impl<T> Smallest<T> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::definition::Population;
     use super::*;
+    use crate::dispersion::Scheme;
 
-    const GROUP: Group = Group { population: 0, variant: 1, mode: 0, flight_time: Some(0) };
+    const GROUP: Group =
+        Group { population: 0, variant: 1, mode: 0, flight_time: Some(0), outer: None };
 
     fn series(damping: &[f64]) -> Vec<Found> {
         let found = |damping: &f64| {
@@ -340,14 +487,14 @@ mod tests {
     }
 
     #[test]
-    fn failures_are_counted_and_leave_the_shares_to_the_rest() {
+    fn failures_are_counted_and_count_as_bad() {
         let series = series(&[0.01, f64::NAN, -0.02, 0.03, -0.01]);
-        let row = summarise(GROUP, true, &series).unwrap();
+        let row = summarise(GROUP, Sample::INDEPENDENT, &series).unwrap();
         assert_eq!((row.cases, row.failures, row.unstable), (5, 1, 2));
-        assert_eq!(row.share_unstable, Some(0.5));
-        // R: binom.test(2, 4)$conf.int
+        assert_eq!(row.share_unstable, Some(0.6));
+        // R: binom.test(3, 5)$conf.int
         let [low, high] = row.share_unstable_interval.unwrap();
-        assert!((low - 0.067_585_99).abs() < 5e-9 && (high - 0.932_414_01).abs() < 5e-9);
+        assert!((low - 0.146_632_8).abs() < 5e-8 && (high - 0.947_255_05).abs() < 5e-8);
         let spread = row.damping_ratio.unwrap();
         assert!((spread.mean - 0.0025).abs() < 1e-17);
         assert_eq!((spread.smallest, spread.largest), (-0.02, 0.03));
@@ -358,14 +505,14 @@ mod tests {
 
     #[test]
     fn a_chosen_case_has_no_interval() {
-        let row = summarise(GROUP, false, &series(&[0.01])).unwrap();
+        let row = summarise(GROUP, Sample::turns(Drawing::Designed, 1), &series(&[0.01])).unwrap();
         assert_eq!((row.share_unstable, row.share_unstable_interval), (Some(0.0), None));
         assert_eq!(row.damping_ratio.unwrap().standard_deviation, None);
     }
 
     #[test]
     fn a_group_without_a_result_has_counts_and_nothing_else() {
-        let row = summarise(GROUP, true, &series(&[f64::NAN; 3])).unwrap();
+        let row = summarise(GROUP, Sample::INDEPENDENT, &series(&[f64::NAN; 3])).unwrap();
         assert_eq!((row.cases, row.failures, row.unstable), (3, 3, 0));
         assert_eq!((row.share_unstable, row.share_unstable_interval), (None, None));
         assert_eq!((row.damping_ratio, row.frequency_hz_mean), (None, None));
@@ -377,7 +524,8 @@ mod tests {
         for (found, first) in with.iter_mut().zip([0.01, f64::NAN, 0.01]) {
             found.damping_ratio_gain = found.damping_ratio - first;
         }
-        let [least, mean] = summarise(GROUP, true, &with).unwrap().damping_ratio_gain.unwrap();
+        let [least, mean] =
+            summarise(GROUP, Sample::INDEPENDENT, &with).unwrap().damping_ratio_gain.unwrap();
         assert_eq!((least, mean), (0.03 - 0.01, 0.03 - 0.01));
     }
 
@@ -397,9 +545,9 @@ mod tests {
             .map(|i| if i % 50 == 3 { f64::NAN } else { (f64::from(i) * 0.7).sin() * 0.02 })
             .collect();
         let cases = series(&damping);
-        let whole = summarise(GROUP, true, &cases).unwrap();
+        let whole = summarise(GROUP, Sample::INDEPENDENT, &cases).unwrap();
         for most in [0, 10, 1000] {
-            let mut tally = Tally::new(GROUP, true, most);
+            let mut tally = Tally::new(GROUP, Sample::INDEPENDENT, most);
             let mut passes = 0;
             loop {
                 cases.iter().for_each(|found| tally.add(found).unwrap());
@@ -411,6 +559,88 @@ mod tests {
             assert!(passes > 1);
             assert_eq!(tally.row().unwrap(), whole);
         }
+    }
+
+    #[test]
+    fn replicates_take_turns_and_give_the_intervals_of_their_own_results() {
+        let sample = Sample::turns(Drawing::LowDiscrepancy, 2);
+        let row =
+            summarise(GROUP, sample, &series(&[0.01, -0.01, 0.03, -0.03, f64::NAN, 0.03])).unwrap();
+        assert_eq!((row.intervals, row.share_unstable), (Intervals::Replicates, Some(0.5)));
+        let spread = row.damping_ratio.unwrap();
+        // Means 0.02 and −1/300: t(0.975, 1) = 12.7062 times half their difference about their mean.
+        let [low, high] = spread.mean_interval.unwrap();
+        let (middle, half) = ((0.02 - 0.01 / 3.0) / 2.0, 12.706_204_736 * (0.07 / 3.0) / 2.0);
+        assert!((low - (middle - half)).abs() < 1e-10 && (high - (middle + half)).abs() < 1e-10);
+        // Shares 1/3 (the failed case) and 2/3, cut off at 0 and 1.
+        assert_eq!(row.share_unstable_interval, Some([0.0, 1.0]));
+        let single = Sample::turns(Drawing::LowDiscrepancy, 1);
+        let row = summarise(GROUP, single, &series(&[0.01, 0.02, 0.03])).unwrap();
+        assert_eq!((row.intervals, row.share_unstable_interval), (Intervals::None, None));
+        assert_eq!(row.damping_ratio.unwrap().quantile_intervals, [None; 7]);
+    }
+
+    #[test]
+    fn failed_cases_widen_the_intervals_of_quantiles_on_both_sides() {
+        let mut damping: Vec<f64> = (1..=200).map(f64::from).collect();
+        let median = |damping: &[f64]| {
+            let row = summarise(GROUP, Sample::INDEPENDENT, &series(damping)).unwrap();
+            row.damping_ratio.unwrap().quantile_intervals[3].unwrap()
+        };
+        // R: qbinom(c(0.025, 0.975), 200, 0.5) = 86, 114: order statistics 86 and 115.
+        assert_eq!(median(&damping), [86.0, 115.0]);
+        damping[99] = f64::NAN;
+        assert_eq!(median(&damping), [85.0, 116.0]);
+    }
+
+    #[test]
+    fn every_outer_draw_has_its_statement_and_all_of_them_their_share() {
+        let population = Population {
+            name: "dispersed".into(),
+            cases: 90,
+            fixed: Vec::new(),
+            drawn: true,
+            scheme: Scheme::Nested {
+                inner: 30,
+                flight_day_outside: true,
+                allowed_share: 0.1,
+                risk: 0.1,
+            },
+        };
+        // 30 good inner cases: 0.9^30 = 0.042 ≤ 0.1, met; one bad one: 0.184, undecided; 20 bad: not met.
+        let damping: Vec<f64> = (0..90)
+            .map(|case| match case {
+                35 => f64::NAN,
+                60..80 => -0.01,
+                _ => 0.01,
+            })
+            .collect();
+        let group = Group { flight_time: None, ..GROUP };
+        let cases = series(&damping);
+        let mut tally = Tally::new(group, Sample::of(&population), 10);
+        loop {
+            cases.iter().for_each(|found| tally.add(found).unwrap());
+            if tally.end_pass().unwrap() {
+                break;
+            }
+        }
+        let mut rows = vec![tally.row().unwrap()];
+        rows.extend_from_slice(tally.outer_rows());
+        let statements: Vec<_> = rows.iter().map(|r| (r.group.outer, r.statement)).collect();
+        let expected = [
+            (None, None),
+            (Some(0), Some(Statement::Met)),
+            (Some(1), Some(Statement::Undecided)),
+            (Some(2), Some(Statement::NotMet)),
+        ];
+        assert_eq!(statements, expected);
+        let outer = rows[0].outer.unwrap();
+        assert_eq!((outer.met, outer.not_met, outer.share_met), (1, 1, 1.0 / 3.0));
+        // R: binom.test(1, 3)$conf.int
+        let [low, high] = outer.share_met_interval;
+        assert!((low - 0.008_403_76).abs() < 5e-9 && (high - 0.905_700_68).abs() < 5e-9);
+        assert_eq!(rows[0].intervals, Intervals::Replicates);
+        assert_eq!((rows[2].failures, rows[2].share_unstable), (1, Some(1.0 / 30.0)));
     }
 
     #[test]

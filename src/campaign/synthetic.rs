@@ -6,6 +6,7 @@
 use super::definition::{Definition, Feedback, NozzleJet, Population, Slope, Variant};
 use super::outline::{DrawColumn, Input, Outline, StoredPoles};
 use super::record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};
+use crate::dispersion::Scheme;
 use nalgebra::Complex;
 
 /// A definition with two variants, two flight times, two modes and the given numbers of cases.
@@ -29,6 +30,7 @@ pub fn definition(cases: &[u64]) -> Definition {
         cases,
         fixed: if index == 2 { vec![(1, 0.0025)] } else { Vec::new() },
         drawn: index > 0,
+        scheme: Scheme::MonteCarlo,
     };
     Definition {
         name: "synthetic".to_owned(),

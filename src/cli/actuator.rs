@@ -22,6 +22,8 @@ pub struct Args {
     /// Engines, by path, `*` for any part (default: all)
     #[arg(long, value_name = "PATH")]
     engine: Option<String>,
+    #[command(flatten)]
+    outside: super::outside::Args,
 }
 
 /// Runs the command.
@@ -29,7 +31,7 @@ pub struct Args {
 /// # Errors
 /// All problems of the vehicle; an engine that does not exist.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
-    let vehicle = io::scenario::vehicle(&args.vehicle)?.resolved.vehicle;
+    let vehicle = io::scenario::vehicle(&args.vehicle, args.outside.reach())?.resolved.vehicle;
     let chosen = args.engine.as_deref().unwrap_or("*.*");
     let paths: Vec<String> = vehicle.engines.iter().map(|e| e.path()).collect();
     if !paths.iter().any(|path| pattern::matches(chosen, path)) {

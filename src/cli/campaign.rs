@@ -13,6 +13,7 @@ use crate::report::story;
 use std::cell::RefCell;
 use std::io::Write;
 use std::path::Path;
+use std::time::Duration;
 
 /// Most threads: more would not help, and a mistyped number not stop the machine.
 const MOST_JOBS: i64 = 1024;
@@ -51,9 +52,19 @@ pub struct Options {
     /// lesser one cannot be had). Parts of one run never mix
     #[arg(long, value_name = "NAME")]
     pub isa: Option<String>,
+    /// Longest time until cases are on the disk for good, s (default: 5, or one hundredth of the
+    /// time so far up to 600)
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub save_every: Option<Duration>,
     /// How progress is shown
     #[arg(long, value_enum, default_value_t = Show::Auto)]
     pub progress: Show,
+}
+
+/// Reads a time.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let time = text.parse().ok().and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    time.ok_or_else(|| "allowed: a number of seconds, 0 or more".to_owned())
 }
 
 impl Options {
@@ -134,12 +145,13 @@ pub fn evaluate(
     definition: &Definition,
     spans: &[Span],
     pool: &Pool,
-    show: Show,
+    mut shown: Shown,
     interrupt: &Interrupt,
     evaluate: impl Fn(usize, u64) -> Record + Sync,
 ) -> Result<Results, Error> {
     let before = cases_of(&results.store().spans()) - cases_of(&results.store().missing());
-    let shown = RefCell::new(Shown::new(show, cases_of(spans)));
+    shown.begin(cases_of(spans));
+    let shown = RefCell::new(shown);
     let results = RefCell::new(results);
     let progress = pool.run(
         definition,
@@ -197,14 +209,17 @@ fn go_on() -> String {
     if !words.iter().any(|word| word == "--resume" || word.starts_with("--shard")) {
         words.push("--resume".to_owned());
     }
-    let plain = |word: &String| {
-        !word.is_empty() && word.chars().all(|c| c.is_alphanumeric() || "-_./=:,+@".contains(c))
-    };
-    let quoted = |word: &String| {
-        if plain(word) { word.clone() } else { format!("'{}'", word.replace('\'', "'\\''")) }
-    };
-    let words: Vec<String> = words.iter().map(quoted).collect();
+    let words: Vec<String> = words.iter().map(|word| quoted(word)).collect();
     format!("go on with: tvse {}", words.join(" "))
+}
+
+/// A word as a shell takes it.
+pub fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./=:,+@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', "'\\''"))
 }
 
 /// Ends a part: its cases are there, the tables are not made.
@@ -277,8 +292,8 @@ pub fn carry_out(
     say_mended(&results);
     let missing = results.store().missing();
     let definition = results.store().outline().definition.clone();
-    let results =
-        evaluate(results, &definition, &missing, pool, options.progress, interrupt, case)?;
+    let shown = Shown::new(options.progress, options.save_every);
+    let results = evaluate(results, &definition, &missing, pool, shown, interrupt, case)?;
     match campaign.access {
         Access::Part(part) => end_part(&results, part, out),
         Access::Whole => finish(results, jobs, campaign.title, campaign.gates, out),

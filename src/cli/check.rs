@@ -15,6 +15,8 @@ Example:
 pub struct Args {
     /// The run definition
     run: PathBuf,
+    #[command(flatten)]
+    outside: super::outside::Args,
 }
 
 /// Runs the command.
@@ -22,7 +24,7 @@ pub struct Args {
 /// # Errors
 /// All problems of the run file and of what it names.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
-    let loaded = io::scenario::load(&args.run)?;
+    let loaded = io::scenario::load(&args.run, args.outside.reach())?;
     if let Some(gates) = &loaded.gates {
         let draws = loaded.dispersion.draws().iter().map(DrawColumn::of).collect();
         let definition = loaded.definition.clone();

@@ -1,16 +1,19 @@
 //! `tvse how-many`: the cases a claim needs, and what a finished campaign can claim.
 
 use crate::cli::Error;
-use crate::report::how_many::{Claim, cases_needed, exceedances_allowed};
+use crate::io::{Run, summarise};
+use crate::report::how_many::{Claim, cases_needed, exceedances_allowed, finished};
 use crate::stats::{Confidence, Probability, Tails};
 use std::io::Write;
+use std::path::PathBuf;
 
 /// How many cases a claim needs, or what a number of cases can claim.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   tvse how-many --coverage 0.9973 --risk 0.10                  cases for 0 to 3 exceedances
   tvse how-many --coverage 0.95 --risk 0.05 --two-sided        two bounds that enclose
-  tvse how-many --coverage 0.9973 --risk 0.10 --cases 2000     what 2000 cases can claim")]
+  tvse how-many --coverage 0.9973 --risk 0.10 --cases 2000     what 2000 cases can claim
+  tvse how-many --coverage 0.95 --risk 0.10 --run runs/reference    what a finished run can claim")]
 pub struct Args {
     /// Share of the population that the bound keeps, above 0 and below 1.
     #[arg(long)]
@@ -27,6 +30,9 @@ pub struct Args {
     /// Cases of a campaign: shows the exceedances it may have.
     #[arg(long)]
     cases: Option<u64>,
+    /// Folder of a finished run: what it can claim about unstable poles.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["cases", "exceedances", "two_sided"])]
+    run: Option<PathBuf>,
 }
 
 /// Prints the table.
@@ -40,6 +46,13 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         confidence: Confidence::from_risk(args.risk).map_err(usage("--risk"))?,
         tails: if args.two_sided { Tails::Two } else { Tails::One },
     };
+    if let Some(folder) = &args.run {
+        let run = Run::open(folder)?;
+        let rows = summarise::summary(&run, summarise::MEMORY)?;
+        let text = finished(&claim, run.outline(), &rows);
+        write!(out, "{}", text.map_err(|error| Error::Usage(error.to_string()))?)?;
+        return Ok(super::PASS);
+    }
     let text = match (args.cases, args.exceedances) {
         (Some(cases), asked) => exceedances_allowed(&claim, cases, asked),
         (None, Some(k)) => cases_needed(&claim, [k]),
@@ -54,7 +67,7 @@ mod tests {
     use super::*;
 
     fn args(coverage: f64, risk: f64, cases: Option<u64>) -> Args {
-        Args { coverage, risk, exceedances: None, two_sided: false, cases }
+        Args { coverage, risk, exceedances: None, two_sided: false, cases, run: None }
     }
 
     #[test]

@@ -6,15 +6,18 @@
 pub mod actuator;
 pub mod campaign;
 pub mod check;
+pub mod compare;
 pub mod completions;
 pub mod error;
 pub mod gate;
 pub mod how_many;
+pub mod import;
 pub mod init;
 pub mod interrupt;
 pub mod merge;
 pub mod modes;
 pub mod nominal;
+pub mod outside;
 pub mod part;
 pub mod plan;
 pub mod planar;
@@ -23,7 +26,11 @@ pub mod replay;
 pub mod retry;
 pub mod run;
 pub mod schema;
+pub mod selection;
+pub mod sensitivity;
+pub mod statistics;
 pub mod status;
+pub mod submit;
 pub mod summary;
 
 pub use error::Error;
@@ -58,12 +65,17 @@ enum Command {
     Check(check::Args),
     Plan(plan::Args),
     Modes(modes::Args),
+    Import(import::Args),
     Nominal(nominal::Args),
     Run(run::Args),
     Merge(merge::Args),
     Status(status::Args),
+    Submit(submit::Args),
     Retry(retry::Args),
     Summary(summary::Args),
+    Statistics(statistics::Args),
+    Sensitivity(sensitivity::Args),
+    Compare(compare::Args),
     Gate(gate::Args),
     Replay(replay::Args),
     HowMany(how_many::Args),
@@ -115,12 +127,17 @@ pub fn run() -> ExitCode {
         Command::Check(args) => check::run(args, &mut out),
         Command::Plan(args) => plan::run(args, &mut out),
         Command::Modes(args) => modes::run(args, &mut out),
+        Command::Import(args) => import::run(args, &mut out),
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),
         Command::Merge(args) => merge::run(args, &mut out),
         Command::Status(args) => status::run(args, &mut out),
+        Command::Submit(args) => submit::run(args, &mut out),
         Command::Retry(args) => retry::run(args, &mut out),
         Command::Summary(args) => summary::run(args, &mut out),
+        Command::Statistics(args) => statistics::run(args, &mut out),
+        Command::Sensitivity(args) => sensitivity::run(args, &mut out),
+        Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),

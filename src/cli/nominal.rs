@@ -2,7 +2,7 @@
 
 use super::{Error, PASS};
 use crate::campaign::{Definition, Evaluator, Population};
-use crate::dispersion::Sampler;
+use crate::dispersion::{Sampler, Scheme};
 use crate::{io, report};
 use std::io::Write;
 use std::path::PathBuf;
@@ -19,6 +19,8 @@ pub struct Args {
     /// Every pole, not only those of the modes of interest
     #[arg(long)]
     all: bool,
+    #[command(flatten)]
+    outside: super::outside::Args,
 }
 
 /// Runs the command.
@@ -26,8 +28,14 @@ pub struct Args {
 /// # Errors
 /// All problems of the run and what it names.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
-    let loaded = io::scenario::load(&args.run)?;
-    let nominal = Population { name: "nominal".into(), cases: 1, fixed: Vec::new(), drawn: false };
+    let loaded = io::scenario::load(&args.run, args.outside.reach())?;
+    let nominal = Population {
+        name: "nominal".into(),
+        cases: 1,
+        fixed: Vec::new(),
+        drawn: false,
+        scheme: Scheme::MonteCarlo,
+    };
     let definition = Definition { populations: vec![nominal], ..loaded.definition };
     let sampler = Sampler::new(&loaded.dispersion, definition.seed);
     let vehicle = &loaded.vehicle.vehicle;

@@ -3,7 +3,6 @@
 use super::{Error, PASS};
 use crate::campaign::outline::DrawColumn;
 use crate::campaign::{Outline, StoredPoles};
-use crate::dispersion::Sampler;
 use crate::{io, report};
 use std::io::Write;
 use std::path::PathBuf;
@@ -22,6 +21,8 @@ pub struct Args {
     /// File for the draws of every case; it must not exist
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    outside: super::outside::Args,
 }
 
 /// Runs the command.
@@ -29,13 +30,13 @@ pub struct Args {
 /// # Errors
 /// All problems of the run and what it names; an output file that exists or cannot be written.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
-    let loaded = io::scenario::load(&args.run)?;
-    let mut definition = loaded.definition;
+    let loaded = io::scenario::load(&args.run, args.outside.reach())?;
+    let mut definition = loaded.definition.clone();
     let corners = loaded.corners.iter().flat_map(|c| c.populations(&definition.populations));
     let open: Vec<usize> = corners.collect();
     let mut index = 0..;
     definition.populations.retain(|_| index.next().is_none_or(|index| !open.contains(&index)));
-    let sampler = Sampler::new(&loaded.dispersion, definition.seed);
+    let sampler = loaded.sampler(&definition)?;
     let draws = loaded.dispersion.draws();
     let mut text = report::plan::table(&definition, draws, &sampler);
     if let Some(path) = &args.output {

@@ -1,12 +1,20 @@
 //! `tvse planar`: the planar pair of one nozzle and one bending mode.
 
+use super::campaign::{self, Campaign, Options};
+use super::interrupt::Interrupt;
 use super::{Error, PASS};
+use crate::campaign::definition::MOST_CASES;
+use crate::campaign::planar::{PlanarCampaign, Scatter};
 use crate::dynamics::NozzleJet;
 use crate::dynamics::planar::{CriticalThrust, Parameters, Planar, Verdict};
+use crate::io::Results;
+use crate::io::inputs::Inputs;
 use nalgebra::Complex;
 use std::io::Write;
+use std::path::{Path, PathBuf};
 
-/// Poles, Routh array and critical thrust of the planar pair (one nozzle, one bending mode).
+/// Poles, Routh array and critical thrust of the planar pair (one nozzle, one bending mode), or a
+/// campaign of it.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Any consistent set of units will do; SI is named. The coupling is either given or made from the
@@ -19,7 +27,10 @@ Examples:
               --phi 2.8e-3 --psi 3.4e-4 --first-moment 5670 --thrust 1.2e7 \\
               --mass-flow 4700 --nozzle-length 4 --nozzle-jet equation-13
   tvse planar --inertia 1 --zeta-n 0.3 --omega-n 1.2 --zeta-b 0.005 --omega-b 1 \\
-              --upsilon 0.2 --phi 1 --sweep 0:1:101 > poles.csv")]
+              --upsilon 0.2 --phi 1 --sweep 0:1:101 > poles.csv
+  tvse planar --inertia 1 --zeta-n 0.3 --omega-n 1.2 --zeta-b 0.005 --omega-b 1 \\
+              --upsilon 0.2 --phi 1 --cases 100000 --output pair \\
+              --scatter thrust=0:0.4 --scatter zeta_b=0.0035:0.0075")]
 pub struct Args {
     /// Nozzle inertia about the pivot J, kg·m²
     #[arg(long, value_name = "J")]
@@ -64,6 +75,24 @@ pub struct Args {
     /// Prints the poles at COUNT thrusts from FROM to TO as CSV instead
     #[arg(long, value_name = "FROM:TO:COUNT")]
     sweep: Option<String>,
+    /// Runs a campaign of so many cases around the pair instead
+    #[arg(long, value_name = "N", requires = "output", conflicts_with = "sweep",
+        value_parser = clap::value_parser!(u64).range(1..=MOST_CASES))]
+    cases: Option<u64>,
+    /// Scatters a parameter evenly between two values in every case; may be repeated
+    #[arg(long, value_name = "NAME=LOW:HIGH", requires = "cases", value_parser = scatter)]
+    scatter: Vec<Scatter>,
+    /// Seed of the campaign
+    #[arg(long, value_name = "N", requires = "cases", default_value_t = 1)]
+    seed: u64,
+    /// Folder of the campaign's results; it must not exist unless the run goes on
+    #[arg(long, short, value_name = "DIR", requires = "cases")]
+    output: Option<PathBuf>,
+    /// Gates to hold the campaign against; the exit code is theirs
+    #[arg(long, value_name = "FILE", requires = "cases")]
+    gates: Option<PathBuf>,
+    #[command(flatten)]
+    options: Options,
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -105,11 +134,44 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         nozzle_length_m: args.nozzle_length,
     };
     let planar = Planar::new(parameters).map_err(|e| Error::Usage(e.to_string()))?;
+    if let (Some(cases), Some(folder)) = (args.cases, &args.output) {
+        return run_campaign(args, parameters, cases, folder, out);
+    }
     match &args.sweep {
         Some(range) => sweep(&planar, range, out)?,
         None => print(&planar, out)?,
     }
     Ok(PASS)
+}
+
+/// Reads `NAME=LOW:HIGH`.
+fn scatter(text: &str) -> Result<Scatter, String> {
+    let parts = text.split_once('=').and_then(|(name, range)| {
+        let (low, high) = range.split_once(':')?;
+        Some((name, low.trim().parse().ok()?, high.trim().parse().ok()?))
+    });
+    let (name, low, high) = parts.ok_or("allowed: NAME=LOW:HIGH, for instance thrust=0:0.4")?;
+    Scatter::new(&name.replace('-', "_"), low, high)
+}
+
+fn run_campaign(
+    args: &Args,
+    parameters: Parameters,
+    cases: u64,
+    folder: &Path,
+    out: &mut dyn Write,
+) -> Result<u8, Error> {
+    let (opening, access) = args.options.opening(folder, true)?;
+    let (pool, jobs) = args.options.pool()?;
+    let interrupt = Interrupt::listen().map_err(|e| Error::Usage(format!("signals: {e}")))?;
+    let pair = PlanarCampaign::new(parameters, &args.scatter, args.seed);
+    let inputs = Inputs::of_text("planar.txt", &format!("{parameters:#?}\n"));
+    let outline = pair.outline(args.seed, cases, inputs.digests());
+    campaign::check_gates(args.gates.as_deref(), &outline)?;
+    let results = Results::open(folder, outline, Some(&inputs), opening, access)?;
+    let campaign = Campaign { access, title: "planar pair", gates: args.gates.as_deref() };
+    let case = |population, case| pair.evaluate(population, case);
+    campaign::carry_out(&campaign, &args.options, (&pool, jobs), &interrupt, results, case, out)
 }
 
 fn poles(planar: &Planar) -> Result<[Complex<f64>; 4], Error> {

@@ -36,23 +36,31 @@ pub struct Shown {
     begun: Instant,
     told: Instant,
     saved: Instant,
+    save_every: Option<Duration>,
 }
 
 impl Shown {
-    /// Progress of `total` cases that begins now.
-    pub fn new(show: Show, total: u64) -> Self {
+    /// Progress that begins now; with `save_every` shards are written that often.
+    pub fn new(show: Show, save_every: Option<Duration>) -> Self {
         let target = if show == Show::Auto && std::io::stderr().is_terminal() {
             ProgressDrawTarget::stderr()
         } else {
             ProgressDrawTarget::hidden()
         };
-        let bar = ProgressBar::with_draw_target(Some(total), target);
+        let bar = ProgressBar::with_draw_target(None, target);
         let template = "{bar:30} {pos}/{len} cases, {per_sec}, {eta} left{msg}";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
         let now = Instant::now();
-        Self { show, bar, begun: now, told: now, saved: now }
+        Self { show, bar, begun: now, told: now, saved: now, save_every }
+    }
+
+    /// Begins with `total` cases.
+    pub fn begin(&mut self, total: u64) {
+        self.bar.set_length(total);
+        let now = Instant::now();
+        (self.begun, self.told, self.saved) = (now, now, now);
     }
 
     /// Shows how far the campaign has come; gives what is to be told to others, when it is time.
@@ -85,6 +93,7 @@ impl Shown {
     /// Whether it is time to write a shard: every few seconds, less often in a long campaign.
     pub fn due(&mut self) -> bool {
         let pause = (self.begun.elapsed() / LOST).clamp(SHORTEST, LONGEST);
+        let pause = self.save_every.unwrap_or(pause);
         let due = self.saved.elapsed() >= pause;
         if due {
             self.saved = Instant::now();

@@ -3,7 +3,6 @@
 use super::{Error, FAIL, PASS};
 use crate::campaign::row::{self, ModeRow};
 use crate::campaign::{Evaluator, StoredPoles};
-use crate::dispersion::Sampler;
 use crate::io::replay::Replay;
 use crate::io::{Run, inputs};
 use crate::report;
@@ -59,7 +58,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
 
     let loaded = inputs::read(&args.run, &outline.inputs)?;
 
-    let sampler = Sampler::new(&loaded.dispersion, definition.seed);
+    let sampler = loaded.sampler(definition)?;
     let all = outline.poles == StoredPoles::All;
     let vehicle = &loaded.vehicle.vehicle;
     let evaluator = Evaluator::new(vehicle, &sampler, definition, all)

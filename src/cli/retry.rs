@@ -2,11 +2,10 @@
 
 use super::campaign::{self, evaluate, finish};
 use super::interrupt::Interrupt;
-use super::progress::Show;
+use super::progress::{Show, Shown};
 use super::{Error, PASS};
 use crate::campaign::pool::{Pool, Span};
 use crate::campaign::{Evaluator, StoredPoles};
-use crate::dispersion::Sampler;
 use crate::io::store::{Access, Store};
 use crate::io::{Results, Run, inputs};
 use std::io::Write;
@@ -49,7 +48,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let outline = stored.outline();
     let definition = &outline.definition;
     let loaded = inputs::read(&args.run, &outline.inputs)?;
-    let sampler = Sampler::new(&loaded.dispersion, definition.seed);
+    let sampler = loaded.sampler(definition)?;
     let all = outline.poles == StoredPoles::All;
     let vehicle = &loaded.vehicle.vehicle;
     let evaluator = Evaluator::new(vehicle, &sampler, definition, all)
@@ -62,7 +61,8 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let results = Results::of(store);
     campaign::say_mended(&results);
     let case = |population, case| evaluator.evaluate(population, case);
-    let results = evaluate(results, definition, &failed, &pool, args.progress, &interrupt, case)?;
+    let shown = Shown::new(args.progress, None);
+    let results = evaluate(results, definition, &failed, &pool, shown, &interrupt, case)?;
     let code = finish(results, jobs, &vehicle.name, None, out)?;
     let after = cases(&self::failed(&Run::open(&args.run)?)?);
     writeln!(out, "{before} failed cases were evaluated again, {after} of them fail still")?;

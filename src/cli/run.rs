@@ -6,7 +6,6 @@ use super::interrupt::Interrupt;
 use crate::campaign::definition::MOST_CASES;
 use crate::campaign::evaluator::Evaluator;
 use crate::campaign::{Outline, Pool, StoredPoles, corner, outline::DrawColumn};
-use crate::dispersion::Sampler;
 use crate::io::inputs::Inputs;
 use crate::io::{self, Results};
 use crate::problem::Problems;
@@ -48,6 +47,8 @@ pub struct Args {
     poles: Poles,
     #[command(flatten)]
     options: Options,
+    #[command(flatten)]
+    outside: super::outside::Args,
 }
 
 /// Which poles the `modes` table holds.
@@ -65,11 +66,15 @@ enum Poles {
 /// All problems of the run and what it names; an output folder that exists or cannot be written; a
 /// signal that asks to stop. Then what is evaluated is kept.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
-    let mut loaded = io::scenario::load(&args.run)?;
+    let mut loaded = io::scenario::load(&args.run, args.outside.reach())?;
     let folder = args.output.clone().unwrap_or_else(|| args.run.with_extension(""));
     let (opening, access) = args.options.opening(&folder, args.cases.is_some())?;
     let definition = &mut loaded.definition;
     if let Some(cases) = args.cases {
+        if let Some(p) = definition.populations.iter().find(|p| p.scheme.has_own_cases()) {
+            let message = format!("--cases: the plan ({}) has its own number", p.scheme.describe());
+            return Err(Error::Usage(message));
+        }
         definition.set_cases(cases);
     }
     if let Some(seed) = args.seed {
@@ -87,10 +92,12 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     };
     let draws = loaded.dispersion.draws().iter().map(DrawColumn::of).collect();
     let outline = Outline::new(loaded.definition.clone(), poles, draws, inputs.digests());
+    // A plan that does not fit is refused before anything is made.
+    loaded.sampler(&outline.definition)?;
     campaign::check_gates(args.gates.as_deref(), &outline)?;
     let results = Results::open(&folder, outline, Some(&inputs), opening, access)?;
     let definition = results.store().outline().definition.clone();
-    let sampler = Sampler::new(&loaded.dispersion, definition.seed);
+    let sampler = loaded.sampler(&definition)?;
     let evaluator = Evaluator::new(vehicle, &sampler, &definition, poles == StoredPoles::All)
         .map_err(|error| unprepared(&args.run, &error))?;
     let campaign = Campaign { access, title: &vehicle.name, gates: args.gates.as_deref() };

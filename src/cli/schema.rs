@@ -28,6 +28,8 @@ enum File {
     Dispersion,
     /// A stick model
     Stick,
+    /// An import description
+    Import,
     /// Gates
     Gates,
     /// The head of a modal package, package.toml
@@ -46,6 +48,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         File::Run => schema(FileKind::Run),
         File::Dispersion => schema(FileKind::Dispersion),
         File::Stick => schema(FileKind::Stick),
+        File::Import => schema(FileKind::Import),
         File::Gates => schema(FileKind::Gates),
         File::Package => package::schema(),
         File::Report => gate::report_schema(),

@@ -2,9 +2,10 @@
 //!
 //! It is made from a table by `resolve`; numbers are drawn from it by `sampler`.
 
+use super::correlation::Group;
 use super::law::Law;
 use super::parameter::Parameters;
-use super::table::Apply;
+use super::table::{Apply, Class};
 use std::collections::BTreeMap;
 
 /// The common score in which a draw takes part.
@@ -49,6 +50,11 @@ pub struct Draw {
     pub law: Law,
     /// Adverse low and high value, in the units of the law; may lie outside the law.
     pub worst: Option<[f64; 2]>,
+    /// When its value is known.
+    pub class: Class,
+    /// Its dimension in a Sobol sequence: its place in the order of the table, the common scores
+    /// first, the keys of one row in the order of their text.
+    pub dimension: usize,
     /// What it is for.
     pub role: Role,
 }
@@ -71,13 +77,14 @@ pub(super) struct Combination {
 pub struct Dispersion {
     parameters: Parameters,
     draws: Vec<Draw>,
+    groups: Vec<Group>,
     combinations: Vec<Combination>,
 }
 
 impl Dispersion {
     /// `draws` ordered by key; on each parameter an absolute value acts first, then scales, then
     /// offsets, so that neither the order of rows nor other parameters matter.
-    pub(super) fn new(parameters: Parameters, draws: Vec<Draw>) -> Self {
+    pub(super) fn new(parameters: Parameters, draws: Vec<Draw>, groups: Vec<Group>) -> Self {
         let mut combinations: BTreeMap<usize, Combination> = BTreeMap::new();
         for (index, draw) in draws.iter().enumerate() {
             let Role::Value { apply, targets, .. } = &draw.role else { continue };
@@ -95,7 +102,7 @@ impl Dispersion {
                 }
             }
         }
-        Self { parameters, draws, combinations: combinations.into_values().collect() }
+        Self { parameters, draws, groups, combinations: combinations.into_values().collect() }
     }
 
     /// The parameters of the vehicle, by whose numbers effects are ordered.
@@ -106,6 +113,11 @@ impl Dispersion {
     /// The draws, ordered by key.
     pub fn draws(&self) -> &[Draw] {
         &self.draws
+    }
+
+    /// The groups of correlated draws.
+    pub fn groups(&self) -> &[Group] {
+        &self.groups
     }
 
     /// Index of the draw with the key `key`.

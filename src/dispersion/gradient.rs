@@ -1,7 +1,8 @@
 //! Gradients by independent normal scores: from the effects on parameters back to the draw keys.
 //!
 //! Every key has one independent standard normal score: a common score itself, the individual score of a
-//! key that takes part in one, else the score of its own value. What a parameter does is not known here.
+//! key that takes part in one, in a group of correlated keys the one from which its score is made, else the
+//! score of its own value. What a parameter does is not known here.
 
 use super::draw::{Dispersion, Role};
 use super::law::Position;
@@ -65,6 +66,12 @@ impl Dispersion {
                 _ => by_score,
             };
         }
+        for group in self.groups() {
+            let by: Vec<_> = group.draws.iter().map(|&i| found[i].unwrap_or_default()).collect();
+            for (&index, by) in group.draws.iter().zip(group.pull(&by)) {
+                found[index] = found[index].and(Some(by));
+            }
+        }
         found
     }
 
@@ -97,8 +104,18 @@ impl Dispersion {
     /// The values of all draws at independent scores, index and value; draws without a score are left out.
     pub fn values_at(&self, scores: &[Option<f64>]) -> Vec<(usize, f64)> {
         let mut values = Vec::new();
+        let mut individual = scores.to_vec();
+        for group in self.groups() {
+            let independent: Vec<f64> =
+                group.draws.iter().map(|&i| scores[i].unwrap_or(0.0)).collect();
+            let mut correlated = independent.clone();
+            group.correlate(&independent, &mut correlated);
+            for (&index, score) in group.draws.iter().zip(correlated) {
+                individual[index] = individual[index].and(Some(score));
+            }
+        }
         for (index, draw) in self.draws().iter().enumerate() {
-            let own = scores[index];
+            let own = individual[index];
             let score = match &draw.role {
                 Role::Value { common: Some(shared), .. } => {
                     let common = scores[shared.draw].map(|z| shared.weight * z);
@@ -126,6 +143,14 @@ impl Dispersion {
             // With all of the weight on the common score there is nothing of its own.
             Some(if rest > 0.0 { (score - shared.weight * common) / rest } else { 0.0 })
         };
-        self.draws().iter().enumerate().map(own).collect()
+        let mut found: Vec<Option<f64>> = self.draws().iter().enumerate().map(own).collect();
+        for group in self.groups() {
+            let correlated: Vec<f64> =
+                group.draws.iter().map(|&i| found[i].unwrap_or(0.0)).collect();
+            for (&index, score) in group.draws.iter().zip(group.independent(&correlated)) {
+                found[index] = found[index].and(Some(score));
+            }
+        }
+        found
     }
 }

@@ -2,10 +2,11 @@
 //!
 //! Raw types belong to `table`; the result is a [`Dispersion`].
 
+use super::correlation::{Group, Offender};
 use super::draw::{Dispersion, Draw, Role, Shared, name_columns};
 use super::law::Law;
 use super::parameter::{Domain, Parameter, Parameters, Place, Quantity, Scope};
-use super::table::{Apply, Common, Row, Table};
+use super::table::{Apply, Class, Common, Correlation, Row, Table};
 use crate::spelling;
 use crate::vehicle::{Bearing, Vehicle};
 use std::collections::{BTreeMap, BTreeSet};
@@ -84,8 +85,9 @@ impl Level {
 pub fn resolve(table: &Table, vehicle: &Vehicle, report: Report) -> Dispersion {
     let parameters = Parameters::of(vehicle);
     let mut draws = commons(&table.common, report);
-    let common: BTreeMap<&str, String> =
-        table.common.iter().map(|c| (c.id.as_str(), common_key(&c.id))).collect();
+    let common: BTreeMap<&str, Class> =
+        table.common.iter().map(|c| (c.id.as_str(), c.class)).collect();
+    let mut sound = true;
     let mut owners: BTreeMap<String, usize> = BTreeMap::new();
     let mut absolutes: BTreeMap<usize, usize> = BTreeMap::new();
     // Which draw takes part in which common score, by key until the draws are in order.
@@ -105,7 +107,10 @@ pub fn resolve(table: &Table, vehicle: &Vehicle, report: Report) -> Dispersion {
             at("id", quoted(row.id.as_deref()), NAME.into());
         }
         let shares = shares(row, &common, &mut at);
-        let Some(matched) = matching(row, vehicle, &parameters, &mut at) else { continue };
+        let Some(matched) = matching(row, vehicle, &parameters, &mut at) else {
+            sound = false;
+            continue;
+        };
         let level = level(row, &matched, vehicle, &mut at);
         let quantity = matched.quantity;
         let unit = if row.apply == Apply::Scale { "1" } else { quantity.definition().unit };
@@ -117,7 +122,10 @@ pub fn resolve(table: &Table, vehicle: &Vehicle, report: Report) -> Dispersion {
         if let Ok(law) = &law {
             check_values(row, law, quantity, &mut at);
         }
-        let (Ok(law), Some(level)) = (law, level) else { continue };
+        let (Ok(law), Some(level)) = (law, level) else {
+            sound = false;
+            continue;
+        };
         let mut keys: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         for target in targets {
             let key = draw_key(row, level, &parameters, &parameters.all()[target]);
@@ -147,6 +155,8 @@ pub fn resolve(table: &Table, vehicle: &Vehicle, report: Report) -> Dispersion {
                 source: row.source.clone(),
                 law: law.clone(),
                 worst: row.worst,
+                class: row.class,
+                dimension: draws.len(),
                 role: Role::Value { apply: row.apply, common: None, targets },
             });
         }
@@ -163,7 +173,9 @@ pub fn resolve(table: &Table, vehicle: &Vehicle, report: Report) -> Dispersion {
         }
     }
     name_columns(&mut draws);
-    Dispersion::new(parameters, draws)
+    // Keys of rows that could not be read would only seem to be unknown.
+    let groups = if sound { groups(&table.correlation, &draws, report) } else { Vec::new() };
+    Dispersion::new(parameters, draws, groups)
 }
 
 const NAME: &str = "letters, digits, `_` and `-`";
@@ -204,6 +216,8 @@ fn commons(commons: &[Common], report: Report) -> Vec<Draw> {
             source: common.source.clone(),
             law: Law::standard_normal(),
             worst: None,
+            class: common.class,
+            dimension: draws.len(),
             role: Role::Common,
         });
     }
@@ -213,16 +227,20 @@ fn commons(commons: &[Common], report: Report) -> Vec<Draw> {
 /// The common score in which a row takes part, and its weight.
 fn shares(
     row: &Row,
-    common: &BTreeMap<&str, String>,
+    common: &BTreeMap<&str, Class>,
     at: &mut dyn FnMut(&str, String, String),
 ) -> Option<(String, f64)> {
     match (&row.common, row.common_weight) {
         (None, None) => None,
         (Some(id), Some(weight)) => {
-            if !common.contains_key(id.as_str()) {
+            let Some(class) = common.get(id.as_str()) else {
                 let declared = spelling::allowed_instead(id, common.keys().copied());
                 at("common", quoted(Some(id)), format!("the id of a [[common]]: {declared}"));
                 return None;
+            };
+            if *class != row.class {
+                let found = format!("{:?}, the common score being {class:?}", row.class);
+                at("class", found, "the class of the common score".into());
             }
             if !(weight > 0.0 && weight <= 1.0) {
                 at("common_weight", weight.to_string(), "above 0, at most 1".into());
@@ -238,6 +256,95 @@ fn shares(
             None
         }
     }
+}
+
+/// The groups of correlated draws that a table's matrices say.
+fn groups(correlations: &[Correlation], draws: &[Draw], report: Report) -> Vec<Group> {
+    let mut owners: BTreeMap<usize, usize> = BTreeMap::new();
+    let mut groups = Vec::new();
+    for (number, correlation) in correlations.iter().enumerate() {
+        let mut sound = true;
+        let mut at = |key: &str, found: String, allowed: &str| {
+            sound = false;
+            report(format!("correlation[{number}].{key}"), found, allowed.into());
+        };
+        if correlation.source.trim().is_empty() {
+            at("source", "an empty text".into(), "the source of the numbers");
+        }
+        let mut members = Vec::new();
+        for (i, key) in correlation.keys.iter().enumerate() {
+            let place = format!("keys[{i}]");
+            let Ok(index) = draws.binary_search_by(|d| d.key.as_str().cmp(key)) else {
+                let known = draws.iter().map(|d| d.key.as_str());
+                at(&place, quoted(Some(key)), &spelling::allowed_instead(key, known));
+                continue;
+            };
+            let found = match &draws[index] {
+                Draw { role: Role::Common, .. } => Some("a common score"),
+                Draw { role: Role::Value { common: Some(_), .. }, .. } => {
+                    Some("a key that takes part in a common score")
+                }
+                Draw { law, .. } if !law.is_continuous() => Some("a key of single values"),
+                Draw { class, .. }
+                    if members.first().is_some_and(|m: &usize| draws[*m].class != *class) =>
+                {
+                    Some("a key of another class")
+                }
+                _ => None,
+            };
+            if let Some(found) = found {
+                let allowed = "keys of one class with continuous laws and no common score";
+                at(&place, format!("\"{key}\", {found}"), allowed);
+            }
+            if let Some(owner) = owners.insert(index, number) {
+                let found = format!("\"{key}\", which correlation[{owner}] has too");
+                at(&place, found, "each key once");
+            }
+            members.push(index);
+        }
+        let size = correlation.keys.len();
+        let square = correlation.matrix.len() == size
+            && correlation.matrix.iter().all(|row| row.len() == size);
+        if !square {
+            let rows = correlation.matrix.len();
+            let found = format!("{rows} rows for {size} keys, or rows of another length");
+            at("matrix", found, "as many rows, and numbers in each, as keys");
+            continue;
+        }
+        for (i, row) in correlation.matrix.iter().enumerate() {
+            for (j, r) in row.iter().enumerate() {
+                let (mirror, place) = (correlation.matrix[j][i], format!("matrix[{i}][{j}]"));
+                if i == j && *r != 1.0 {
+                    at(&place, r.to_string(), "1, on the diagonal");
+                } else if i != j && !(r.abs() < 1.0) {
+                    at(&place, r.to_string(), "above −1 and below 1");
+                } else if j > i && *r != mirror {
+                    at(
+                        &place,
+                        format!("{r}, and {mirror} across"),
+                        "the same number on both sides",
+                    );
+                }
+            }
+        }
+        if !sound || members.len() != size {
+            continue;
+        }
+        match Group::new(members, correlation.kind, &correlation.matrix) {
+            Ok(group) => groups.push(group),
+            Err(Offender { pair: [i, j], allowed: [low, high], together }) => {
+                let keys = &correlation.keys;
+                let found = format!(
+                    "{} between `{}` and `{}`: the matrix is not positive definite (already for the \
+                     keys number {together:?})",
+                    correlation.matrix[i][j], keys[i], keys[j]
+                );
+                let allowed = format!("for this pair, the others as they are, {low} < r < {high}");
+                report(format!("correlation[{number}].matrix[{i}][{j}]"), found, allowed);
+            }
+        }
+    }
+    groups
 }
 
 /// The parameters that a row's path names, all of one quantity.

@@ -50,16 +50,22 @@ impl Stream {
 
     /// The uniforms of the consecutive cases from `first_case`, as [`Stream::uniform`] gives them.
     pub fn fill(&self, first_case: u64, uniforms: &mut [f64]) {
+        uniforms
+            .iter_mut()
+            .zip(self.words(first_case))
+            .for_each(|(u, word)| *u = open_uniform(word));
+    }
+
+    /// The 64-bit numbers of the cases from `first_case` on.
+    pub(super) fn words(&self, first_case: u64) -> impl Iterator<Item = u64> + use<> {
         let mut generator = ChaCha8Rng::from_seed(self.secret);
         generator.set_word_pos(2 * u128::from(first_case));
-        for u in uniforms {
-            *u = open_uniform(generator.next_u64());
-        }
+        std::iter::from_fn(move || Some(generator.next_u64()))
     }
 }
 
 /// (2j + 1)/2^53 with j the upper 52 bits of `word`.
-fn open_uniform(word: u64) -> f64 {
+pub(super) fn open_uniform(word: u64) -> f64 {
     const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
     // The odd integer is below 2^53, hence exact.
     ((word >> 12) << 1 | 1) as f64 * STEP

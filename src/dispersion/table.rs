@@ -3,9 +3,10 @@
 //! Only shapes and types of values are known here; what rows mean for a vehicle is decided in
 //! `resolve`, and how text is read in `scenario`.
 
+use super::correlation::Kind;
 use super::law::{Bound, Law, Refusal};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// A dispersion table: what is uncertain about a vehicle, by how much, and who says so.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -18,6 +19,38 @@ pub struct Table {
     /// Dispersed parameters.
     #[serde(default)]
     pub row: Vec<Row>,
+    /// Correlations between the values of draw keys.
+    #[serde(default)]
+    pub correlation: Vec<Correlation>,
+}
+
+/// A matrix of correlations between draw keys (a Gaussian copula; margins stay as they are).
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Correlation {
+    /// What the numbers are: `rank` (Spearman) or `normal_score`.
+    pub kind: Kind,
+    /// Whole draw keys, for instance `booster.left.nozzle.mass @ engine`; each in one matrix only.
+    #[schemars(length(min = 2))]
+    pub keys: Vec<String>,
+    /// Symmetric, ones on the diagonal, positive definite; a row for each key.
+    #[schemars(length(min = 2))]
+    pub matrix: Vec<Vec<f64>>,
+    /// Source of the numbers.
+    pub source: String,
+}
+
+/// When the value of a draw is known (the classes of uncertainty of NASA/TP-2010-216447).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Class {
+    /// Known for each vehicle before its flight day.
+    Vehicle,
+    /// Known on the flight day.
+    FlightDay,
+    /// Never known.
+    #[default]
+    Unknown,
 }
 
 /// A standard normal number drawn once per case, in which several rows may take part.
@@ -28,6 +61,9 @@ pub struct Common {
     pub id: String,
     /// Why these rows are correlated, and who says so.
     pub source: String,
+    /// When its value is known; `unknown` unless given. Rows that share it have the same class.
+    #[serde(default)]
+    pub class: Class,
 }
 
 /// One dispersed parameter, or with `*` segments many.
@@ -60,6 +96,9 @@ pub struct Row {
     /// Adverse low and high value for worst-on-worst cases, in the units of the law; may lie
     /// outside the law.
     pub worst: Option<[f64; 2]>,
+    /// When the value is known; `unknown` unless given. A nested plan tells them apart.
+    #[serde(default)]
+    pub class: Class,
 }
 
 /// How a drawn value x acts on a nominal value.

@@ -14,6 +14,8 @@ use tempfile::NamedTempFile;
 
 /// The largest text file that is read, bytes; hand-written scenarios are thousandths of it.
 const LARGEST_TEXT: u64 = 64 << 20;
+/// The largest file of data that is read as a whole, bytes.
+const LARGEST_DATA: u64 = 2 << 30;
 /// Bytes written and taken back when a file is opened, so that a full disk is found at once.
 const PROBE: usize = 64 << 10;
 
@@ -132,6 +134,26 @@ pub fn remove(path: &Path) -> Result<(), Problems> {
     }
 }
 
+/// A path that does not depend on the current folder.
+///
+/// # Errors
+/// One problem if the current folder is not known.
+pub fn absolute(path: &Path) -> Result<PathBuf, Problems> {
+    std::path::absolute(path).map_err(|e| problem(path, &e, "a path"))
+}
+
+/// A path with every link followed, as far as it exists.
+pub fn resolved(path: &Path) -> PathBuf {
+    if path.as_os_str().is_empty() {
+        return resolved(Path::new("."));
+    }
+    fs::canonicalize(path).unwrap_or_else(|_| match (path.parent(), path.file_name()) {
+        (Some(parent), Some(name)) => resolved(parent).join(name),
+        (Some(parent), None) => resolved(parent).parent().unwrap_or(Path::new("/")).to_owned(),
+        (None, _) => path.to_owned(),
+    })
+}
+
 /// What the name of a file written aside begins with.
 pub const ASIDE: &str = ".aside-";
 
@@ -197,9 +219,15 @@ pub fn create_parents(path: &Path) -> Result<(), Problems> {
 /// All bytes of a file.
 ///
 /// # Errors
-/// One problem if it is missing or unreadable.
+/// One problem if it is missing, unreadable or larger than 2 GiB.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, Problems> {
-    fs::read(path).map_err(|e| problem(path, &e, "a readable file"))
+    let failed = |e: io::Error| problem(path, &e, "a readable file");
+    let bytes = size(path).map_err(failed)?;
+    if bytes > LARGEST_DATA {
+        let found = format!("{bytes} bytes");
+        return Err(Problems::damage(name(path), "", found, "at most 2 GiB"));
+    }
+    fs::read(path).map_err(failed)
 }
 
 /// Removes a folder with all that is in it, as far as the system lets it go.

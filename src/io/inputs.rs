@@ -3,6 +3,7 @@
 //! A copy is called by what it is, not by where the original lies: absolute paths, links and
 //! folders of the originals do not matter. How copies are read is decided in `scenario`.
 
+use super::listed::Format;
 use super::scenario::{self, Loaded};
 use super::{files, package};
 use crate::campaign::outline::Input;
@@ -17,6 +18,9 @@ pub const RUN: &str = "run.toml";
 pub const VEHICLE: &str = "vehicle.toml";
 /// Copy of the dispersion table.
 pub const DISPERSION: &str = "dispersion.toml";
+/// Copies of the plan file, by its kind.
+pub const PLANS: [(&str, Format); 2] =
+    [("plan.csv", Format::Csv), ("plan.parquet", Format::Parquet)];
 /// Copy of the modal package's folder.
 pub const MODES: &str = "modes";
 
@@ -34,6 +38,10 @@ impl Inputs {
         let texts = texts.into_iter().chain([(DISPERSION, &loaded.dispersion_file)]);
         let mut inputs: Vec<(String, Vec<u8>)> =
             texts.map(|(name, (_, text))| (name.into(), text.clone().into_bytes())).collect();
+        if let Some((format, bytes, _)) = &loaded.plan_file {
+            let name = PLANS.iter().find(|(_, known)| known == format);
+            inputs.extend(name.map(|(name, _)| ((*name).to_owned(), bytes.clone())));
+        }
         let folder = &loaded.modal_package;
         for path in package::files(folder) {
             let inside = path.strip_prefix(folder).unwrap_or(&path);
@@ -122,6 +130,7 @@ pub fn copy_of(folder: &Path, key: &str) -> PathBuf {
     folder.join(match key {
         "vehicle" => VEHICLE,
         "dispersion" => DISPERSION,
+        name if PLANS.iter().any(|(plan, _)| *plan == name) => name,
         _ => MODES,
     })
 }

@@ -11,6 +11,7 @@ mod tests;
 
 use super::flat::{Column, Holds, Layout, Table};
 use super::{files, folder};
+use crate::import::{Made, Moved};
 use crate::problem::{Kind, Problems};
 use crate::structure::Thresholds;
 use crate::vehicle::Modal;
@@ -101,6 +102,32 @@ pub const PARENTS: Layout = Layout {
         Column("overlap", Holds::Number("1"), "Squared mass-weighted overlap of the shapes"),
     ],
 };
+/// Quality of sections, a table beside the others that imported packages have; no campaign reads it.
+pub const SECTIONS: Layout = Layout {
+    name: "sections",
+    columns: &[
+        TIME,
+        LABEL,
+        Column("grid", Holds::Text, "Name of the grid whose rotation comes from a section"),
+        Column("nodes", Holds::Number("1"), "Nodes of the section"),
+        Column("residual", Holds::Number("1"), "Misfit to a rigid motion over the motion"),
+        Column(
+            "scatter_rad_per_m_sqrt_kg",
+            Holds::Number("rad/m kg^-1/2"),
+            "Deviation of the rotation if the misfit is scatter between nodes",
+        ),
+        Column(
+            "rounding_rad_per_m_sqrt_kg",
+            Holds::Number("rad/m kg^-1/2"),
+            "Deviation of the rotation by the rounding of stored translations",
+        ),
+    ],
+};
+/// Layouts of the tables.
+pub fn layouts() -> [&'static Layout; 5] {
+    LAYOUTS
+}
+
 const LAYOUTS: [&Layout; 5] = [&GRIDS, &MODES, &SHAPES, &MASS, &PARENTS];
 
 /// `package.toml`.
@@ -126,6 +153,46 @@ pub struct Header {
     /// BLAKE3 digest of each table file, hexadecimal. May be left out as a whole.
     #[serde(default)]
     pub blake3: BTreeMap<String, String>,
+    /// Where the modes were imported from, and how good they are.
+    pub import: Option<ImportHeader>,
+}
+
+/// Where imported modes come from, and how good they are.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ImportHeader {
+    /// Programs that wrote the results.
+    pub programs: Vec<String>,
+    /// Units that were declared.
+    pub units: String,
+    /// What was doubtful.
+    #[serde(default)]
+    pub warnings: Vec<String>,
+    /// BLAKE3 digest of the table `sections`, if there is one.
+    pub sections_blake3: Option<String>,
+    /// BLAKE3 digest of each file that was read, by its name in the description.
+    #[serde(default)]
+    pub inputs: BTreeMap<String, String>,
+    /// Grids by their role.
+    #[serde(default)]
+    pub roles: BTreeMap<String, Vec<String>>,
+    /// Rigid-body modes of each flight time.
+    #[serde(default)]
+    pub rigid_body_mode: Vec<RigidHeader>,
+}
+
+/// A rigid-body mode of the files.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RigidHeader {
+    /// Flight time, s.
+    pub flight_time_s: f64,
+    /// Number in the file.
+    pub number: i64,
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Share of the shape that no rigid motion explains, 0 to 1.
+    pub residual: f64,
 }
 
 /// Overlaps by which labels were given.
@@ -149,15 +216,85 @@ pub fn write(
     thresholds: &Thresholds,
     force: bool,
 ) -> Result<(), Problems> {
+    write_with(dir, modal, thresholds, force, None)
+}
+
+/// Writes imported modal data as the package `dir`, with their quality; `units` as declared,
+/// `inputs` the digest of each file by its name.
+///
+/// # Errors
+/// As for [`write`].
+pub fn write_imported(
+    dir: &Path,
+    made: &Made,
+    units: &str,
+    inputs: BTreeMap<String, String>,
+    force: bool,
+) -> Result<(), Problems> {
+    let mut programs: Vec<String> = Vec::new();
+    for time in &made.times {
+        if !programs.contains(&time.program) {
+            programs.push(time.program.clone());
+        }
+    }
+    let rigid = made.times.iter().flat_map(|time| {
+        time.rigid.modes.iter().map(|mode| RigidHeader {
+            flight_time_s: time.flight_time_s,
+            number: mode.number,
+            frequency_hz: mode.frequency_hz,
+            residual: mode.residual,
+        })
+    });
+    let mut roles: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for (grid, role) in &made.roles {
+        roles.entry((*role).to_owned()).or_default().push(grid.clone());
+    }
+    let import = ImportHeader {
+        programs,
+        units: units.to_owned(),
+        warnings: made.warnings.clone(),
+        sections_blake3: None,
+        inputs,
+        roles,
+        rigid_body_mode: rigid.collect(),
+    };
+    let mut sections = Table::new(&SECTIONS);
+    for row in &made.sections {
+        let numbers =
+            [row.flight_time_s, row.nodes as f64, row.residual, row.scatter, row.rounding];
+        sections.push(&[&row.label, &row.grid], &numbers);
+    }
+    write_with(dir, &made.modal, &made.thresholds, force, Some((import, sections)))
+}
+
+fn write_with(
+    dir: &Path,
+    modal: &Modal,
+    thresholds: &Thresholds,
+    force: bool,
+    import: Option<(ImportHeader, Table)>,
+) -> Result<(), Problems> {
     let mut blake3 = BTreeMap::new();
     let mut contents = Vec::new();
-    for (layout, table) in LAYOUTS.into_iter().zip(tables(modal)) {
+    let mut add = |layout: &Layout, table: &Table| -> Result<String, Problems> {
         let bytes = table.to_bytes(layout).map_err(|e| {
             Problems::damage(files::name(dir), layout.name, e.to_string(), "a table to write")
         })?;
-        blake3.insert(layout.name.to_owned(), blake3::hash(&bytes).to_hex().to_string());
+        let digest = blake3::hash(&bytes).to_hex().to_string();
         contents.push((table_path(layout), bytes));
+        Ok(digest)
+    };
+    for (layout, table) in LAYOUTS.into_iter().zip(tables(modal)) {
+        blake3.insert(layout.name.to_owned(), add(layout, &table)?);
     }
+    let import = match import {
+        None => None,
+        Some((header, sections)) if sections.rows() == 0 => Some(header),
+        Some((mut header, sections)) => {
+            header.sections_blake3 = Some(add(&SECTIONS, &sections)?);
+            Some(header)
+        }
+    };
     let header = Header {
         format: 1,
         source: modal.source.clone(),
@@ -171,10 +308,41 @@ pub fn write(
             parent_overlap: thresholds.parent,
         }),
         blake3,
+        import,
     };
     let text = toml::to_string(&header).expect("a flat header is always TOML");
     contents.push((HEADER.into(), text.into_bytes()));
     folder::write(dir, &contents, force.then_some(HEADER))
+}
+
+/// Where the modes of the package in `dir` were imported from, with the quality of its sections;
+/// `None` if they were not imported.
+///
+/// # Errors
+/// Problems of the header, and of the table `sections` where the header names one.
+pub fn read_import(dir: &Path) -> Result<Option<(ImportHeader, Vec<Moved>)>, Problems> {
+    let path = dir.join(HEADER);
+    let header = header(&files::read_text(&path)?, &files::name(&path))?;
+    let Some(import) = header.import else { return Ok(None) };
+    let mut rows = Vec::new();
+    if let Some(digest) = &import.sections_blake3 {
+        let path = dir.join(table_path(&SECTIONS));
+        let table = Table::from_bytes(&SECTIONS, bytes(&path, Some(digest))?, &files::name(&path))?;
+        for (i, (label, grid)) in table.texts(1).zip(table.texts(2)).enumerate() {
+            let n = |column: usize| table.numbers(column)[i];
+            rows.push(Moved {
+                flight_time_s: n(0),
+                grid: grid.to_owned(),
+                label: label.to_owned(),
+                // Counts of nodes are whole and small.
+                nodes: n(3) as usize,
+                residual: n(4),
+                scatter: n(5),
+                rounding: n(6),
+            });
+        }
+    }
+    Ok(Some((import, rows)))
 }
 
 fn table_path(layout: &Layout) -> PathBuf {

@@ -24,7 +24,11 @@ pub fn write(path: &Path, outline: &Outline, sampler: &Sampler<'_>) -> Result<u6
     let mut cursor = sampler.cursor();
     for (index, population) in outline.definition.populations.iter().enumerate() {
         for case in 0..population.cases {
-            let draws = cursor.draw(case, &population.fixed, population.drawn);
+            let draws = if population.scheme.is_monte_carlo() {
+                cursor.draw(case, &population.fixed, population.drawn)
+            } else {
+                cursor.draw_planned(case)
+            };
             let record = Record {
                 population: index,
                 case,

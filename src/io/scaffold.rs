@@ -54,12 +54,12 @@ mod tests {
         let paths = write(&target).unwrap();
         for run in ["runs/reference.toml", "runs/all-engines.toml", "runs/smoke.toml"] {
             assert!(paths.contains(&run));
-            let loaded = scenario::load(&target.join(run)).unwrap();
+            let loaded = scenario::load(&target.join(run), scenario::Reach::Study).unwrap();
             assert_eq!(loaded.vehicle.vehicle.name, "SLS-like, synthetic");
         }
         let problems = write(&target).unwrap_err();
         assert!(problems.0[0].found.contains("exists"), "{problems}");
-        assert!(scenario::load(&target.join("runs/smoke.toml")).is_ok());
+        assert!(scenario::load(&target.join("runs/smoke.toml"), scenario::Reach::Study).is_ok());
     }
 
     #[test]

@@ -4,17 +4,21 @@
 //! decided in `column` and `table`.
 
 use super::column::Column;
+use crate::campaign::Population;
 use crate::campaign::metric::metrics;
+use crate::campaign::nested::Statement;
+use crate::campaign::Sensitivity;
 use crate::campaign::outline::{Outline, StoredPoles};
 use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
 use crate::campaign::row::{CaseRow, ModeRow};
+use crate::campaign::sample::Intervals;
 use crate::campaign::summary::{LEVELS, Spread, SummaryRow, WorstRow};
 use crate::dynamics::Part;
 use arrow::datatypes::Field;
 use std::sync::Arc;
 
 /// Version of the tables' columns and metadata; a change of either raises it.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Most cases in a row group.
 const MOST_GROUP_CASES: u64 = 8192;
@@ -92,7 +96,9 @@ impl TableName {
             StoredPoles::All => ALL_POLES,
         };
         let evaluations = definition.variants.len() * definition.flight_times_s.len();
-        let rows = (evaluations as u64 * poles).max(1);
+        // With derivatives a row is as long as many.
+        let long = outline.definition.sensitivity.as_ref().map_or(0, |_| outline.draws.len() / 8);
+        let rows = (evaluations as u64 * poles * (1 + long as u64)).max(1);
         let cases = (GROUP_ROWS / rows).clamp(1, MOST_GROUP_CASES);
         1 << cases.ilog2()
     }
@@ -137,7 +143,26 @@ fn mode<R>(
 
 /// Columns of a table of draws alone: which case, drawn values, normal scores.
 pub fn plan(outline: &Outline) -> Vec<Column<CaseRow>> {
-    identity(outline).into_iter().chain(draws(outline)).collect()
+    identity(outline).into_iter().chain(structure(outline)).chain(draws(outline)).collect()
+}
+
+/// Which outer draw or replicate a case belongs to, where a plan has them.
+fn structure(outline: &Outline) -> Vec<Column<CaseRow>> {
+    type Of = fn(&Population, u64) -> Option<u64>;
+    let columns: [(&str, &str, Of); 2] = [
+        ("outer", "Outer draw of a nested plan; NULL for other populations", Population::outer),
+        ("replicate", "Replicate of the plan; NULL for other populations", Population::replicate),
+    ];
+    let there = |of: Of| outline.definition.populations.iter().any(|p| of(p, 0).is_some());
+    let columns = columns.into_iter().filter(|(_, _, of)| there(*of));
+    columns
+        .map(|(name, description, of)| {
+            let populations = outline.definition.populations.clone();
+            Column::count(name, description, move |r: &CaseRow| {
+                Some(of(populations.get(r.population)?, r.case)? as i64)
+            })
+        })
+        .collect()
 }
 
 fn identity(outline: &Outline) -> [Column<CaseRow>; 2] {
@@ -152,6 +177,7 @@ fn identity(outline: &Outline) -> [Column<CaseRow>; 2] {
 /// Columns of the `cases` table.
 pub fn cases(outline: &Outline) -> Vec<Column<CaseRow>> {
     let mut columns = Vec::from(identity(outline));
+    columns.extend(structure(outline));
     columns.extend([
         Column::word(
             "status",
@@ -288,6 +314,56 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
             r.outcome.as_ref().err().map(|f| f.message.as_str())
         }),
     ]);
+    columns.extend(sensitivity(outline));
+    columns
+}
+
+/// Words of the `sensitivity` column.
+pub const SENSITIVITIES: [&str; 2] = ["ok", "veering"];
+
+/// Columns of derivatives, where the run stores them.
+fn sensitivity(outline: &Outline) -> Vec<Column<ModeRow>> {
+    if outline.definition.sensitivity.is_none() {
+        return Vec::new();
+    }
+    fn of(row: &ModeRow) -> Option<&Sensitivity> {
+        row.outcome.as_ref().ok()?.sensitivity.as_deref()
+    }
+    let mut columns = vec![
+        Column::word(
+            "sensitivity",
+            "ok, or veering: the derivatives are right but the nearest pole bends what a change of one \
+             sigma does by more than a tenth; NULL where none are stored",
+            SENSITIVITIES,
+            |r: &ModeRow| of(r).map(|s| usize::from(s.is_veering())),
+        ),
+        Column::number(
+            "sensitivity_curvature",
+            "1",
+            "Second-order change of the pole by the nearest other pole for one sigma of each key, over \
+             the first-order change (root sums of squares over the keys)",
+            |r: &ModeRow| of(r)?.curvature,
+        ),
+    ];
+    for (index, draw) in outline.draws.iter().enumerate() {
+        let description = format!(
+            "Change of the damping ratio per sigma of the independent normal score of {}; NULL where \
+             its value has no slope",
+            draw.key
+        );
+        columns.push(Column::number(draw.damping_column(), "1", description, move |r: &ModeRow| {
+            of(r)?.damping_ratio.get(index).copied().flatten()
+        }));
+    }
+    for (index, draw) in outline.draws.iter().enumerate() {
+        let description = format!(
+            "Change of the real part of the pole per sigma of the independent normal score of {}",
+            draw.key
+        );
+        columns.push(Column::number(draw.real_column(), "rad/s", description, move |r: &ModeRow| {
+            of(r)?.real_part_rad_s.get(index).copied().flatten()
+        }));
+    }
     columns
 }
 
@@ -314,14 +390,14 @@ pub fn summary(outline: &Outline) -> Vec<Column<SummaryRow>> {
         Column::number(
             "share_unstable",
             "1",
-            "Share of unstable cases among those with a result",
+            "Share of the cases that are unstable or failed",
             |r: &SummaryRow| r.share_unstable,
         ),
         Column::number(
             "share_unstable_low",
             "1",
-            "Lower end of its exact 95 % interval (Clopper and Pearson); NULL if the cases are \
-             not independent draws",
+            "Lower end of its 95 % interval (Clopper and Pearson; over replicates where `intervals` \
+             says so); NULL where no interval follows from the cases",
             |r: &SummaryRow| r.share_unstable_interval.map(|[low, _]| low),
         ),
         Column::number(
@@ -330,18 +406,48 @@ pub fn summary(outline: &Outline) -> Vec<Column<SummaryRow>> {
             "Upper end of that interval",
             |r: &SummaryRow| r.share_unstable_interval.map(|[_, high]| high),
         ),
+        Column::word(
+            "intervals",
+            "independent_cases: exact binomial, Student's t and order statistics of independent \
+             draws; replicates: Student's t over independent replicates or outer draws; none",
+            Intervals::ALL.map(Intervals::name),
+            |r: &SummaryRow| Intervals::ALL.iter().position(|i| *i == r.intervals),
+        ),
     ];
+    if outline.definition.populations.iter().any(|p| p.outer(0).is_some()) {
+        columns.extend(nested());
+    }
     type Pick = Box<dyn Fn(&Spread) -> Option<f64> + Send>;
-    let mut spread: Vec<(&str, String, Pick)> = vec![
+    let mut spread: Vec<(String, String, Pick)> = Vec::new();
+    let location: Vec<(&str, String, Pick)> = vec![
         ("mean", "Mean".to_owned(), Box::new(|s| Some(s.mean))),
+        (
+            "mean_low",
+            "Lower end of the 95 % interval of the mean".to_owned(),
+            Box::new(|s| s.mean_interval.map(|[low, _]| low)),
+        ),
+        (
+            "mean_high",
+            "Upper end of the 95 % interval of the mean".to_owned(),
+            Box::new(|s| s.mean_interval.map(|[_, high]| high)),
+        ),
         ("sd", "Sample standard deviation".to_owned(), Box::new(|s| s.standard_deviation)),
         ("min", "Least value".to_owned(), Box::new(|s| Some(s.smallest))),
     ];
+    spread.extend(location.into_iter().map(|(name, text, pick)| (name.to_owned(), text, pick)));
     for (index, (level, name)) in LEVELS.into_iter().enumerate() {
         let description = format!("Quantile at {level} (linear between order statistics)");
-        spread.push((name, description, Box::new(move |s| Some(s.quantiles[index]))));
+        spread.push((name.to_owned(), description, Box::new(move |s| Some(s.quantiles[index]))));
+        for (end, words, side) in [("low", "Lower", 0), ("high", "Upper", 1)] {
+            let description = format!(
+                "{words} end of the 95 % interval of the quantile at {level}, failed cases taken for \
+                 the worst on that side; NULL where the cases are too few or give none; value"
+            );
+            let pick: Pick = Box::new(move |s| s.quantile_intervals[index].map(|ends| ends[side]));
+            spread.push((format!("{name}_{end}"), description, pick));
+        }
     }
-    spread.push(("max", "Greatest value".to_owned(), Box::new(|s| Some(s.largest))));
+    spread.push(("max".to_owned(), "Greatest value".to_owned(), Box::new(|s| Some(s.largest))));
     columns.extend(spread.into_iter().map(|(name, description, pick)| {
         Column::number(
             format!("damping_ratio_{name}"),
@@ -376,8 +482,50 @@ pub fn summary(outline: &Outline) -> Vec<Column<SummaryRow>> {
             "Mean of that gain (of each case's least over the flight times, where reduced)",
             |r: &SummaryRow| r.damping_ratio_gain.map(|[_, mean]| mean),
         ),
+        Column::number(
+            "damping_ratio_gain_mean_low",
+            "1",
+            "Lower end of the 95 % interval of the mean gain (paired differences)",
+            |r: &SummaryRow| r.gain_mean_interval.map(|[low, _]| low),
+        ),
+        Column::number(
+            "damping_ratio_gain_mean_high",
+            "1",
+            "Upper end of that interval",
+            |r: &SummaryRow| r.gain_mean_interval.map(|[_, high]| high),
+        ),
     ]);
     columns
+}
+
+/// Columns of the `summary` table that only a nested plan has.
+fn nested() -> Vec<Column<SummaryRow>> {
+    let count = |name: &str, description: &str, get: fn(&SummaryRow) -> Option<u64>| {
+        Column::count(name, description, move |r: &SummaryRow| get(r).map(|n| n as i64))
+    };
+    let number = |name: &str, description: &str, get: fn(&SummaryRow) -> Option<f64>| {
+        Column::number(name, "1", description, get)
+    };
+    vec![
+        count("outer", "Outer draw; NULL for all cases of the population", |r| r.group.outer),
+        Column::word(
+            "statement",
+            "Whether the outer draw meets the plan's statement; NULL for all cases",
+            Statement::ALL.map(Statement::name),
+            |r: &SummaryRow| Statement::ALL.iter().position(|s| Some(*s) == r.statement),
+        ),
+        count("outer_met", "Outer draws that meet it", |r| r.outer.map(|o| o.met)),
+        count("outer_not_met", "Outer draws that do not", |r| r.outer.map(|o| o.not_met)),
+        number("outer_share_met", "Share of the outer draws that meet it", |r| {
+            r.outer.map(|o| o.share_met)
+        }),
+        number("outer_share_met_low", "Lower end of its exact 95 % interval", |r| {
+            r.outer.map(|o| o.share_met_interval[0])
+        }),
+        number("outer_share_met_high", "Upper end of that interval", |r| {
+            r.outer.map(|o| o.share_met_interval[1])
+        }),
+    ]
 }
 
 /// Columns of the `worst` table.

@@ -166,6 +166,21 @@ pub fn is_name(name: &str) -> bool {
     name.ends_with(".shard")
 }
 
+impl Header {
+    /// Reads the first line of a shard, without its line feed.
+    ///
+    /// # Errors
+    /// In words, what was found instead.
+    pub fn parse(line: &[u8]) -> Result<Self, String> {
+        let text = std::str::from_utf8(line).ok().and_then(|line| line.strip_prefix(MAGIC));
+        let header = text
+            .and_then(|text| text.split_once(' '))
+            .filter(|(digest, header)| *digest == files::digest_of(header.as_bytes()));
+        let Some((_, header)) = header else { return Err("another first line".to_owned()) };
+        serde_json::from_str(header).map_err(|error| error.to_string())
+    }
+}
+
 impl Shard {
     /// Reads the first line of a shard and holds it against its run, name and size. What the
     /// tables hold is checked when they are read.
@@ -178,15 +193,8 @@ impl Shard {
         let line = files::first_line(path, LONGEST_HEADER)
             .map_err(|error| damage(error.to_string(), "the first line of a shard"))?;
         let length = line.len() as u64 + 1;
-        let text = std::str::from_utf8(&line).ok().and_then(|line| line.strip_prefix(MAGIC));
-        let header = text
-            .and_then(|text| text.split_once(' '))
-            .filter(|(digest, header)| *digest == files::digest_of(header.as_bytes()));
-        let Some((_, header)) = header else {
-            return Err(damage("another first line".to_owned(), "that of a shard"));
-        };
-        let header: Header = serde_json::from_str(header)
-            .map_err(|error| damage(error.to_string(), "the header of a shard"))?;
+        let header =
+            Header::parse(&line).map_err(|found| damage(found, "the first line of a shard"))?;
         if header.schema_version != schema::VERSION {
             let found = format!("schema version {}", header.schema_version);
             return Err(damage(found, &format!("schema version {}", schema::VERSION)));
@@ -270,6 +278,11 @@ impl Shard {
         let same = fields.iter().zip(&allowed).all(|(a, b)| **a == *b);
         if !same || fields.len() != allowed.len() {
             return Err(damage("other columns".to_owned(), "the columns of the data dictionary"));
+        }
+        let groups = builder.metadata().row_groups().iter();
+        let size = groups.fold(0_i64, |sum, group| sum.saturating_add(group.total_byte_size()));
+        if size > LARGEST as i64 {
+            return Err(damage(format!("{size} bytes unpacked"), &format!("at most {LARGEST}")));
         }
         let rows = builder.metadata().file_metadata().num_rows();
         if u64::try_from(rows) != Ok(content.rows) {

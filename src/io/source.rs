@@ -11,7 +11,6 @@ use crate::gate::{
     CaseValue, Metric, MissingMeans, Names, Population, Query, Source, Table, reduce,
 };
 use crate::problem::Problems;
-use crate::stats::Drawing;
 
 /// Columns of numbers that say which row it is, not what was found.
 const KEYS: [&str; 2] = ["case", "flight_time_s"];
@@ -29,7 +28,7 @@ impl Names for Outline {
         let population = |p: &crate::campaign::Population| Population {
             name: p.name.clone(),
             planned: p.cases,
-            drawing: if p.drawn { Drawing::Independent } else { Drawing::Designed },
+            drawing: p.drawing(),
         };
         self.definition.populations.iter().map(population).collect()
     }
@@ -236,6 +235,7 @@ mod tests {
     use super::*;
     use crate::campaign::{Branch, Record, StoredPoles, synthetic as cases};
     use crate::gate::Worst;
+    use crate::stats::Drawing;
 
     const CASES: u64 = 60;
 

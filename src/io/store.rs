@@ -34,6 +34,8 @@ struct Started {
     schema_version: u32,
     run: Outline,
     maker: Maker,
+    /// Whether cases were added since it began.
+    extended: bool,
 }
 
 /// Where the rows of some cases are.
@@ -59,6 +61,7 @@ pub enum Access {
 pub struct Store {
     folder: PathBuf,
     outline: Outline,
+    extended: bool,
     identity: String,
     /// Finished tables, of all cases or of those before an extension.
     tables: Option<Run>,
@@ -108,7 +111,8 @@ impl Store {
             inputs.write(folder)?;
         }
         let maker = Maker::here();
-        let started = Started { schema_version: schema::VERSION, run: outline, maker };
+        let started =
+            Started { schema_version: schema::VERSION, run: outline, maker, extended: false };
         if !started.write_new(folder)? {
             // Another part of the same run was faster.
             let Found::Started(found) = look(folder)? else { unreachable!("it is there") };
@@ -131,7 +135,8 @@ impl Store {
         let mended = stale.map(|by| format!("took over the stale lock of {}", by.name())).collect();
         let folder = folder.to_owned();
         let shards = Vec::new();
-        Ok(Self { folder, outline, identity, tables, shards, access, mended, locks })
+        let extended = false;
+        Ok(Self { folder, outline, extended, identity, tables, shards, access, mended, locks })
     }
 
     /// Goes on with a run: what is damaged or half written is removed, with a word in
@@ -160,7 +165,7 @@ impl Store {
             outline.definition.populations.iter().map(|p| p.cases).collect()
         };
         let (here, there) = (counts(&expected), counts(&store.outline));
-        if cases && here != there {
+        if cases && here != there && !store.extended {
             let found = format!("{} cases", expected.cases());
             let allowed = format!("{} as the run has, or --extend", store.outline.cases());
             return Err(Problems::input(files::name(&path), "cases", found, allowed));
@@ -175,7 +180,7 @@ impl Store {
             settle(folder)?;
             files::sweep(folder);
         }
-        let (outline, maker, tables) = match look(folder)? {
+        let (outline, maker, tables, extended) = match look(folder)? {
             Found::Nothing => {
                 let found = "neither a finished run nor one under way";
                 let name = files::name(folder);
@@ -183,16 +188,18 @@ impl Store {
             }
             Found::Finished(manifest) => {
                 let maker = manifest.execution.maker.clone();
-                (manifest.run, maker, Some(Run::open(folder)?))
+                (manifest.run, maker, Some(Run::open(folder)?), false)
             }
             Found::Started(started) => {
                 let manifest = folder.join(manifest::FILE).is_file();
                 let tables = if manifest { Some(Run::open(folder)?) } else { None };
-                (started.run, started.maker, tables)
+                (started.run, started.maker, tables, started.extended)
             }
         };
         same_maker(&folder.join(STARTED), &maker)?;
-        Self::new(folder, outline, tables, access, locks)
+        let mut store = Self::new(folder, outline, tables, access, locks)?;
+        store.extended = extended;
+        Ok(store)
     }
 
     /// Opens a run to merge its shards; those in further folders are taken over by name.
@@ -314,13 +321,22 @@ impl Store {
     /// Adds `more` cases to every drawn population.
     ///
     /// # Errors
-    /// An input problem if it cannot be written down.
+    /// An input problem if it cannot be written down, or if the plan of a population cannot have so
+    /// many more cases, or any without changing the first ones.
     pub fn extend(&mut self, more: u64) -> Result<(), Problems> {
+        let draws = self.outline.draws.len() as u64;
+        for p in self.outline.definition.populations.iter().filter(|p| p.drawn) {
+            p.scheme.check_extension(more, draws).map_err(|refusal| {
+                let key = format!("{}.{}", p.name, refusal.key);
+                Problems::input(files::name(&self.folder), key, refusal.found, refusal.allowed)
+            })?;
+        }
         self.outline.definition.add_cases(more);
         let started = Started {
             schema_version: schema::VERSION,
             run: self.outline.clone(),
             maker: Maker::here(),
+            extended: true,
         };
         let text = serde_json::to_string_pretty(&started).expect("text keys only");
         files::write(&self.folder.join(STARTED), text.as_bytes())

@@ -6,6 +6,7 @@
 use super::run::Run;
 use super::schema::TableName;
 use super::stored::{POLE_COLUMNS, PoleRow};
+use crate::campaign::Sample;
 use crate::campaign::metric::{self, Quantity, metrics};
 use crate::campaign::record::{damping_ratio, frequency_hz};
 use crate::campaign::summary::{Found, Smallest, SummaryRow, Tally, WorstRow, groups};
@@ -31,7 +32,7 @@ pub fn summary(run: &Run, memory: usize) -> Result<Vec<SummaryRow>, Problems> {
         let mut reduced = Vec::new();
         for group in groups {
             let tallies = if group.flight_time.is_some() { &mut timed } else { &mut reduced };
-            tallies.push(Tally::new(group, p.drawn, most));
+            tallies.push(Tally::new(group, Sample::of(p), most));
         }
         let passes: [(&mut Vec<Tally>, Pass); 2] =
             [(&mut timed, pass_over_modes), (&mut reduced, pass_over_cases)];
@@ -44,6 +45,8 @@ pub fn summary(run: &Run, memory: usize) -> Result<Vec<SummaryRow>, Problems> {
                 }
             }
         }
+        let mut outer: Vec<_> = reduced.iter().flat_map(Tally::outer_rows).cloned().collect();
+        outer.sort_by_key(|row| row.group);
         // By variant; its flight times, then the worst of them.
         let modes = definition.modes.len();
         let at = definition.flight_times_s.len() * modes;
@@ -53,6 +56,7 @@ pub fn summary(run: &Run, memory: usize) -> Result<Vec<SummaryRow>, Problems> {
                 rows.push(tally.row().map_err(failed)?);
             }
         }
+        rows.extend(outer);
     }
     Ok(rows)
 }

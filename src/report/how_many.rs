@@ -3,8 +3,11 @@
 //! The numbers are those of `stats`.
 
 use super::{percent, significant};
+use crate::campaign::Outline;
+use crate::campaign::summary::SummaryRow;
 use crate::stats::{
-    Confidence, Error, Probability, Tails, consumers_risk, least_cases, most_exceedances,
+    Confidence, Error, Probability, Sides, Tails, clopper_pearson, consumers_risk, least_cases,
+    most_exceedances,
 };
 use comfy_table::{CellAlignment, Table, presets};
 
@@ -40,7 +43,10 @@ impl Claim {
 
 const INDEPENDENT: &str = "Holds for independent draws and any law.\n";
 
-fn table(header: [String; 3], rows: impl IntoIterator<Item = [String; 3]>) -> String {
+fn table<const N: usize>(
+    header: [String; N],
+    rows: impl IntoIterator<Item = [String; N]>,
+) -> String {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
     table.set_header(header);
@@ -92,6 +98,62 @@ pub fn exceedances_allowed(claim: &Claim, cases: u64, asked: Option<u64>) -> Res
     };
     let header = [claim.exceedances().into(), "actual risk, %".into(), "claim holds".into()];
     Ok(format!("{}\n{answer}\n\n{}\n{INDEPENDENT}", claim.words(), table(header, rows)))
+}
+
+/// What a finished run can claim: of each population, variant and mode the bad cases (unstable or failed at
+/// some flight time), whether as many may be bad, and the greatest share of the population that can be
+/// claimed at the risk; and why nothing can be claimed of other populations.
+pub fn finished(claim: &Claim, outline: &Outline, summary: &[SummaryRow]) -> Result<String, Error> {
+    let definition = &outline.definition;
+    let mut rows = Vec::new();
+    let mut refused = String::new();
+    for (index, population) in definition.populations.iter().enumerate() {
+        let independent = match population.drawing().independent() {
+            Ok(independent) => independent,
+            Err(error) => {
+                refused += &format!("{}: no claim: {error}\n", population.name);
+                continue;
+            }
+        };
+        let most = most_exceedances(population.cases, claim.coverage, claim.confidence, Tails::One);
+        let reduced = |row: &&SummaryRow| {
+            row.group.population == index
+                && row.group.flight_time.is_none()
+                && row.group.outer.is_none()
+        };
+        for row in summary.iter().filter(reduced) {
+            let bad = row.unstable + row.failures;
+            let upper =
+                clopper_pearson(bad, row.cases, claim.confidence, Sides::Upper, independent)?;
+            rows.push([
+                population.name.clone(),
+                definition.variants[row.group.variant].name.clone(),
+                definition.modes[row.group.mode].clone(),
+                row.cases.to_string(),
+                bad.to_string(),
+                most.map_or_else(|| "none".into(), |most| most.to_string()),
+                if most.is_some_and(|most| bad <= most) { "yes" } else { "no" }.to_owned(),
+                significant(100.0 * (1.0 - upper.upper())),
+            ]);
+        }
+    }
+    let claims = rows.len();
+    let header = [
+        "population",
+        "variant",
+        "mode",
+        "cases",
+        "unstable or failed",
+        "allowed",
+        "claim holds",
+        "share that can be claimed, %",
+    ];
+    Ok(format!(
+        "{}: no unstable pole at any flight time\n\n{}\n{claims} claims at once, each at this risk; a case \
+         counts once, with its worst flight time.\n{refused}{INDEPENDENT}",
+        claim.words(),
+        table(header.map(str::to_owned), rows)
+    ))
 }
 
 #[cfg(test)]

@@ -1,13 +1,16 @@
 //! Reports: values become text for people, terminal tables first.
 
 pub mod actuator;
+pub mod figure;
 pub mod gates;
 pub mod how_many;
+pub mod import;
 pub mod modes;
 pub mod nominal;
 mod number;
 pub mod plan;
 pub mod scenario;
+pub mod statistics;
 pub mod story;
 
 pub use number::{percent, significant};

@@ -9,12 +9,13 @@ use comfy_table::{CellAlignment, Table, presets};
 /// Per draw key: unit, law range, and mean, standard deviation, smallest and largest value over
 /// the cases of the `dispersed` population.
 pub fn table(definition: &Definition, draws: &[Draw], sampler: &Sampler<'_>) -> String {
-    let cases =
-        definition.populations.iter().find(|p| p.name == "dispersed").map_or(0, |p| p.cases);
+    let dispersed = definition.populations.iter().find(|p| p.name == "dispersed");
+    let cases = dispersed.map_or(0, |p| p.cases);
+    let scheme = dispersed.map_or_else(String::new, |p| p.scheme.describe());
     let mut values = vec![Vec::new(); draws.len()];
     let mut cursor = sampler.cursor();
     for case in 0..cases {
-        let drawn = cursor.draw(case, &[], true);
+        let drawn = cursor.draw_planned(case);
         for (value, values) in drawn.values.iter().zip(&mut values) {
             values.extend(value);
         }
@@ -43,7 +44,7 @@ pub fn table(definition: &Definition, draws: &[Draw], sampler: &Sampler<'_>) -> 
         column.set_cell_alignment(CellAlignment::Right);
     }
     format!(
-        "{cases} dispersed cases, seed {}, {} draw keys\n{table}\n",
+        "{cases} dispersed cases, {scheme}, seed {}, {} draw keys\n{table}\n",
         definition.seed,
         draws.len()
     )

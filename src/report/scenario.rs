@@ -52,7 +52,8 @@ pub fn overview(
             0 => String::new(),
             count => format!(", {count} keys fixed"),
         };
-        let drawn = if population.drawn { "drawn" } else { "not drawn" };
+        let drawn =
+            if population.drawn { population.scheme.describe() } else { "not drawn".into() };
         line(
             "population",
             format!("{}, cases {}, {drawn}{fixed}", population.name, population.cases),

@@ -3,8 +3,11 @@
 //! It is the story of the paper's Figure 6 (poles without and with jet damping, nominal and
 //! dispersed). Only text is made here; who prints it is decided in `cli`.
 
-use crate::campaign::Outline;
+use super::significant;
 use crate::campaign::summary::{Group, LEVELS, SummaryRow, WorstRow};
+use crate::campaign::{Outline, Population};
+use crate::dispersion::Scheme;
+use crate::stats::Drawing;
 use comfy_table::{CellAlignment, Table, presets};
 use std::fmt::Write;
 
@@ -26,6 +29,7 @@ pub fn story(outline: &Outline, summary: &[SummaryRow], worst: &[WorstRow]) -> S
             let rows = || {
                 let of = move |group: &Group| {
                     (group.population, group.mode) == (population, mode)
+                        && group.outer.is_none()
                         && (!corner || group.flight_time.is_none())
                 };
                 summary.iter().filter(move |row| of(&row.group))
@@ -33,7 +37,12 @@ pub fn story(outline: &Outline, summary: &[SummaryRow], worst: &[WorstRow]) -> S
             let failures = rows().filter(|row| row.group.flight_time.is_none());
             let failures = failures.map(|row| row.failures).max().unwrap_or(0);
             let failed = if failures > 0 { format!(", {failures} failed") } else { String::new() };
-            line(&mut text, format_args!("{name}, {}: {} cases{failed}", p.name, p.cases));
+            let scheme = if p.scheme.is_monte_carlo() {
+                String::new()
+            } else {
+                format!(" ({})", p.scheme.describe())
+            };
+            line(&mut text, format_args!("{name}, {}: {} cases{scheme}{failed}", p.name, p.cases));
             if corner {
                 let beyond =
                     |(draw, value): &&(usize, f64)| outline.draws[*draw].outside_law(*value);
@@ -47,7 +56,8 @@ pub fn story(outline: &Outline, summary: &[SummaryRow], worst: &[WorstRow]) -> S
                     ),
                 );
             }
-            line(&mut text, format_args!("{}\n", table(outline, summary, rows())));
+            line(&mut text, format_args!("{}", table(outline, summary, rows())));
+            line(&mut text, format_args!("{}\n", claims(p, rows())));
             for (variant, v) in definition.variants.iter().enumerate() {
                 let of_variant = |row: &&WorstRow| {
                     (row.population, row.mode, row.variant, row.rank)
@@ -60,6 +70,52 @@ pub fn story(outline: &Outline, summary: &[SummaryRow], worst: &[WorstRow]) -> S
             }
             text.push('\n');
         }
+    }
+    text
+}
+
+/// How many claims the table makes at once, or why none; and what outer draws show.
+fn claims<'a>(
+    population: &Population,
+    rows: impl Iterator<Item = &'a SummaryRow> + Clone,
+) -> String {
+    let intervals = rows.clone().filter(|row| row.share_unstable_interval.is_some()).count();
+    let mut text = if intervals > 0 {
+        format!(
+            "{intervals} intervals of 95 % at once: {} of them miss on average; all hold together with \
+             95 % if each is taken at {} % (Bonferroni). Failed cases count as unstable.",
+            significant(0.05 * intervals as f64),
+            significant(100.0 - 5.0 / intervals as f64)
+        )
+    } else {
+        match (population.drawing(), population.scheme.replicates()) {
+            (Drawing::LatinHypercube | Drawing::LowDiscrepancy, 1) => {
+                "no intervals: one replicate shows nothing of its error; give `replicates`".into()
+            }
+            (Drawing::Independent, _) => "no intervals: no case has a result".into(),
+            (drawing, _) => format!("no intervals: these cases are {}", drawing.describe()),
+        }
+    };
+    for row in rows {
+        let (Some(outer), Scheme::Nested { inner, allowed_share, risk, .. }) =
+            (row.outer, &population.scheme)
+        else {
+            continue;
+        };
+        let [low, high] = outer.share_met_interval.map(|end| percent(Some(end), 1));
+        write!(
+            text,
+            "\nvariant {}: {} of {} outer draws are shown to have at most {} % of unstable or failed cases \
+             (risk {} %), {} not to; {} % meet it, 95 % interval {low} – {high}",
+            row.group.variant,
+            outer.met,
+            population.cases / inner,
+            significant(100.0 * allowed_share),
+            significant(100.0 * risk),
+            outer.not_met,
+            percent(Some(outer.share_met), 1),
+        )
+        .expect("a string takes any text");
     }
     text
 }
@@ -157,6 +213,7 @@ fn worst_case(outline: &Outline, rows: &[&WorstRow]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::campaign::Sample;
     use crate::campaign::summary::{Found, groups, summarise};
     use crate::campaign::{StoredPoles, synthetic};
 
@@ -169,7 +226,7 @@ mod tests {
                     let damping = 0.001 * case as f64 - 0.0025;
                     found.add(damping, 5.0, -30.0 * damping);
                 }
-                rows.push(summarise(group, p.drawn, &cases).unwrap());
+                rows.push(summarise(group, Sample::of(p), &cases).unwrap());
             }
         }
         rows
@@ -189,11 +246,11 @@ mod tests {
         assert_eq!(values.len(), 2 * (1 + 2 * 3));
         // Cases 1 to 5 lie at −0.15 to 0.25 %, two of them unstable; log 2/0.045 is 15.4.
         assert_eq!(values[1][0], "no_jet");
-        assert_eq!(values[1][3..6], ["0.050", "-0.150", "40.0"]);
+        assert_eq!(values[1][3..6], ["0.050", "-0.150", "50.0"]);
         assert_eq!(values[1][7], "15.4");
         assert_eq!(values[3][..2], ["", "worst"]);
-        // R: binom.test(2, 5)$conf.int
-        assert_eq!(values[1][6], "5.3 – 85.3");
+        // R: binom.test(3, 6)$conf.int: two unstable cases and one that failed.
+        assert_eq!(values[1][6], "11.8 – 88.2");
     }
 
     #[test]

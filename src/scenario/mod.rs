@@ -5,11 +5,15 @@ pub mod aerodynamics;
 pub mod autopilot;
 pub mod autopilot_file;
 pub mod dispersion;
+mod fixed;
 #[cfg(test)]
 mod fixture;
 pub mod gimbal;
+pub mod import;
+pub mod import_file;
 pub mod names;
 pub mod pattern;
+pub mod plan;
 pub mod run;
 pub mod run_file;
 pub mod schema;

@@ -7,10 +7,10 @@ use super::run_file::{
 };
 use super::table::Findings;
 use super::vehicle::Resolved;
-use super::{names, pattern};
+use super::{fixed, names, pattern, plan};
 use crate::campaign::definition::Feedback;
 use crate::campaign::{Definition, NozzleJet, Population, Slope, Variant};
-use crate::dispersion::Dispersion;
+use crate::dispersion::{Dispersion, Draw, Listed, Scheme};
 use crate::problem::Problems;
 use crate::spelling::allowed_instead;
 
@@ -52,7 +52,8 @@ pub struct Run {
 const STANDARD: [&str; 2] = ["nominal", "dispersed"];
 
 /// Checks what the values of `file` mean together and with its vehicle and dispersion. Without
-/// those (where they could not be read, which `findings` knows) the rest is still checked.
+/// those (where they could not be read, which `findings` knows) the rest is still checked. `listed`
+/// are the cases of its plan file.
 ///
 /// # Errors
 /// All problems of the file.
@@ -61,6 +62,7 @@ pub fn resolve(
     name: &str,
     vehicle: Option<&Resolved>,
     dispersion: Option<&Dispersion>,
+    listed: Option<&Listed>,
     mut findings: Findings,
 ) -> Result<Run, Problems> {
     let f = &mut findings;
@@ -74,14 +76,18 @@ pub fn resolve(
     let gimballed = gimballed(file, vehicle, f);
     servo(&variants, vehicle, &gimballed, f);
 
-    let standard = |name: &str, cases, drawn| Population {
+    let standard = |name: &str, cases, drawn, scheme| Population {
         name: name.into(),
         cases,
         fixed: Vec::new(),
         drawn,
+        scheme,
     };
-    let mut populations =
-        vec![standard(STANDARD[0], 1, false), standard(STANDARD[1], file.cases, true)];
+    let (scheme, cases) = plan::scheme(file, dispersion, listed, f);
+    let mut populations = vec![
+        standard(STANDARD[0], 1, false, Scheme::MonteCarlo),
+        standard(STANDARD[1], cases, true, scheme),
+    ];
     let mut corners = Vec::new();
     for (i, corner) in file.corner.iter().enumerate() {
         let key = format!("corner[{i}]");
@@ -98,7 +104,8 @@ pub fn resolve(
                 Vec::new()
             }
         };
-        let fixed_case = Population { name: corner.name.clone(), cases: 1, fixed, drawn: false };
+        let fixed_case =
+            Population { fixed, ..standard(&corner.name, 1, false, Scheme::MonteCarlo) };
         if corner.cases > 0 {
             let name = around(&corner.name);
             let cloud = Population { name, cases: corner.cases, drawn: true, ..fixed_case.clone() };
@@ -107,6 +114,9 @@ pub fn resolve(
             populations.push(fixed_case);
         }
     }
+    let fixed = fixed::populations(file, &populations, dispersion, f);
+    populations.extend(fixed);
+    let sensitivity = fixed::sensitivity(file, &variants, &flight_times_s, f);
     findings.finish(Some(Run {
         definition: Definition {
             name: name.into(),
@@ -117,7 +127,7 @@ pub fn resolve(
             modes: file.modes.clone(),
             gimballed,
             exchange_ratio: file.identity.exchange_ratio,
-            sensitivity: None,
+            sensitivity,
         },
         corners,
     }))
@@ -256,8 +266,8 @@ fn given(
         f.push(key, "neither `low` nor `high`", "at least one entry in `low` or `high`");
     }
     let Some(dispersion) = dispersion else { return Vec::new() };
-    let low = matching(dispersion, &corner.low, &format!("{key}.low"), f);
-    let high = matching(dispersion, &corner.high, &format!("{key}.high"), f);
+    let low = matching(dispersion, &corner.low, has_worst, &format!("{key}.low"), f);
+    let high = matching(dispersion, &corner.high, has_worst, &format!("{key}.high"), f);
     let both: Vec<usize> = low.iter().copied().filter(|i| high.contains(i)).collect();
     if let Some(&first) = both.first() {
         let key_of = &dispersion.draws()[first].key;
@@ -271,22 +281,28 @@ fn given(
     fixed
 }
 
-/// Indices of the draws with `worst` values that `entries` name, ascending; an entry is a whole
+/// Whether a draw has `worst` values.
+pub(super) fn has_worst(draw: &Draw) -> bool {
+    draw.worst.is_some()
+}
+
+/// Indices of the draws for which `fits` that `entries` name, ascending; an entry is a whole
 /// key or a pattern of its parameter path.
-fn matching(
+pub(super) fn matching(
     dispersion: &Dispersion,
     entries: &[String],
+    fits: fn(&Draw) -> bool,
     place: &str,
     f: &mut Findings,
 ) -> Vec<usize> {
     let names = |entry: &str, key: &str| {
         key == entry || pattern::matches(entry, key.split(" @ ").next().unwrap_or(key))
     };
-    let adverse = || dispersion.draws().iter().enumerate().filter(|(_, d)| d.worst.is_some());
+    let adverse = || dispersion.draws().iter().enumerate().filter(|(_, d)| fits(d));
     for (i, entry) in entries.iter().enumerate() {
         if !adverse().any(|(_, draw)| names(entry, &draw.key)) {
             let allowed = allowed_instead(entry, adverse().map(|(_, d)| d.key.as_str()));
-            let found = format!("\"{entry}\", which matches no draw key with `worst` values");
+            let found = format!("\"{entry}\", which matches no draw key that can stand there");
             f.push(format!("{place}[{i}]"), found, allowed);
         }
     }
@@ -324,7 +340,7 @@ fn evaluated(
     let variant = index("variant", &corner.variant, variants);
     let dispersion = dispersion?;
     let draws = match &corner.keys {
-        Some(entries) => matching(dispersion, entries, &format!("{key}.keys"), f),
+        Some(entries) => matching(dispersion, entries, has_worst, &format!("{key}.keys"), f),
         None => {
             let all = dispersion.draws().iter().enumerate();
             all.filter(|(_, d)| d.worst.is_some()).map(|(i, _)| i).collect()

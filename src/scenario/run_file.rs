@@ -5,6 +5,7 @@
 use crate::campaign::definition::MOST_CASES;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// A campaign: which vehicle and dispersion, how many cases, evaluated where and how.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -18,9 +19,12 @@ pub struct RunFile {
     /// Gates for the run, relative to this file; `tvse check` holds them against the run definition.
     /// They are applied where `--gates` names them.
     pub gates: Option<String>,
-    /// Number of dispersed cases.
+    /// Number of dispersed cases; left out where the plan has its own.
     #[schemars(range(min = 1, max = MOST_CASES))]
-    pub cases: u64,
+    pub cases: Option<u64>,
+    /// How the dispersed cases come about; `monte_carlo` unless given.
+    #[serde(default)]
+    pub plan: PlanFile,
     /// Seed of every draw.
     pub seed: u64,
     /// Flight times, s, ascending (default: all of the vehicle).
@@ -41,10 +45,147 @@ pub struct RunFile {
     /// Adverse corners: fixed cases with Monte Carlo around them.
     #[serde(default)]
     pub corner: Vec<CornerFile>,
+    /// Where the poles are stored with their derivatives by every draw (default: nowhere).
+    pub sensitivity: Option<SensitivityFile>,
+    /// Fixed cases, for instance those that `tvse worst` found and wrote.
+    #[serde(default)]
+    pub fixed: Vec<FixedFile>,
+}
+
+/// Evaluations whose poles are stored with the change of damping ratio and real part per σ of every
+/// draw key: two more columns of the table `modes` a key.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensitivityFile {
+    /// Names of variants (default: all).
+    pub variants: Option<Vec<String>>,
+    /// Flight times of the run, s (default: all).
+    pub flight_times_s: Option<Vec<f64>>,
+    /// Only the first cases of each population (default: all).
+    #[schemars(range(min = 1, max = MOST_CASES))]
+    pub cases: Option<u64>,
+}
+
+/// A fixed case: draw keys at given values, the others nominal; and Monte Carlo around it.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FixedFile {
+    /// Name, a–z, 0–9 and _.
+    pub name: String,
+    /// Whole draw keys and their values, in the unit of the law.
+    pub values: BTreeMap<String, f64>,
+    /// Number of cases around it: keys without a value, and those in `free`, are drawn.
+    #[serde(default)]
+    #[schemars(range(max = MOST_CASES))]
+    pub cases: u64,
+    /// Keys with a value that are drawn all the same in the cases around it, by parameter path, with `*`,
+    /// or whole key.
+    #[serde(default)]
+    pub free: Vec<String>,
 }
 
 fn every_engine() -> Vec<String> {
     vec!["*.*".into()]
+}
+
+/// How the dispersed cases come about.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum PlanFile {
+    /// Independent draws; the only plan from whose cases exact intervals and tolerance bounds follow.
+    MonteCarlo {},
+    /// Latin hypercube: every key is stratified. More cases change the first ones: such a run cannot be
+    /// extended.
+    LatinHypercube {
+        /// Independent hypercubes of cases/replicates points (default 1); two or more give intervals.
+        #[schemars(range(min = 1, max = MOST_REPLICATES))]
+        replicates: Option<u64>,
+    },
+    /// Sobol sequence with Owen's scrambling; best with a power of two of cases a replicate.
+    Sobol {
+        /// Independent scramblings (default 1); two or more give intervals.
+        #[schemars(range(min = 1, max = MOST_REPLICATES))]
+        replicates: Option<u64>,
+    },
+    /// Outer draws of what is known, each with an inner Monte Carlo over what is not (`class` of the
+    /// dispersion's rows). `cases` is left out.
+    Nested {
+        /// Number of outer draws.
+        #[schemars(range(min = 1, max = MOST_CASES))]
+        outer: u64,
+        /// Cases for each outer draw.
+        #[schemars(range(min = 1, max = MOST_CASES))]
+        inner: u64,
+        /// What outer draws hold: what is known by then (default `flight_day`: vehicle and flight day).
+        known: Option<KnownFile>,
+        /// The statement about each outer draw: the share of unstable cases that it may have …
+        #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+        allowed_share_unstable: f64,
+        /// … with this consumer's risk.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+        risk: f64,
+    },
+    /// Two samples and their crossings for first-order and total sensitivity indices: d + 2 cases a
+    /// row for d draw keys. `cases` is left out.
+    Saltelli {
+        /// Number of rows.
+        #[schemars(range(min = 2, max = MOST_CASES))]
+        rows: u64,
+    },
+    /// One key after the other at a low and a high place, all else nominal. `cases` is left out.
+    OneAtATime {
+        /// Keys, by parameter path, with `*`, or whole key (default: every key that can be).
+        keys: Option<Vec<String>>,
+        /// Low and high normal score (default: the `worst` values).
+        at: Option<[f64; 2]>,
+    },
+    /// Every key at a low or a high place: two-level factorial. `cases` is left out.
+    Corners {
+        /// Keys, by parameter path, with `*`, or whole key (default: every key that can be).
+        keys: Option<Vec<String>>,
+        /// Low and high normal score (default: the `worst` values).
+        at: Option<[f64; 2]>,
+        /// A fraction of this resolution instead of all corners: 3, 4 or 5.
+        #[schemars(range(min = 3, max = 5))]
+        resolution: Option<u64>,
+    },
+    /// Cases from a CSV or Parquet file with a column for every draw key. `cases` is left out.
+    File {
+        /// The file, relative to this one; a name that ends in `.csv` or `.parquet`.
+        path: String,
+        /// What columns called by a draw key hold (default `value`). A column called `draw_…`, as in
+        /// the table `cases`, holds values, one called `z_…` normal scores, whatever is said here.
+        columns: Option<ColumnsFile>,
+    },
+}
+
+/// Most independent replicates of a plan.
+const MOST_REPLICATES: u64 = 1000;
+
+impl Default for PlanFile {
+    fn default() -> Self {
+        Self::MonteCarlo {}
+    }
+}
+
+/// What outer draws hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum KnownFile {
+    /// What is known per vehicle.
+    Vehicle,
+    /// What is known per vehicle and on the flight day.
+    FlightDay,
+}
+
+/// What the columns of a plan file hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ColumnsFile {
+    /// Values, in the unit of the law.
+    Value,
+    /// Normal scores z = Φ⁻¹(F(x)).
+    NormalScore,
 }
 
 /// How poles are followed from the nominal to a case.

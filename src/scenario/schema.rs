@@ -2,6 +2,7 @@
 //!
 //! The raw types belong to those who read them.
 
+use super::import_file::ImportFile;
 use super::run_file::RunFile;
 use super::vehicle_file::VehicleFile;
 use crate::dispersion::Table;
@@ -20,6 +21,8 @@ pub enum FileKind {
     Dispersion,
     /// A stick model.
     Stick,
+    /// An import description.
+    Import,
     /// Gates.
     Gates,
 }
@@ -31,6 +34,7 @@ pub fn schema(kind: FileKind) -> Schema {
         FileKind::Run => schemars::schema_for!(RunFile),
         FileKind::Dispersion => schemars::schema_for!(Table),
         FileKind::Stick => schemars::schema_for!(Stick),
+        FileKind::Import => schemars::schema_for!(ImportFile),
         FileKind::Gates => gate::schema(),
     }
 }
@@ -117,6 +121,7 @@ mod tests {
         assert_agreement::<VehicleFile>(fixture::VEHICLE);
         assert_agreement::<RunFile>(include_str!("../../runs/reference.toml"));
         assert_agreement::<Table>(include_str!("../../dispersions/reference.toml"));
+        assert_agreement::<ImportFile>(include_str!("../../docs/import/calculix/import.toml"));
         assert_agreement::<Stick>(include_str!("../../vehicles/sls-like/stick.toml"));
     }
 
@@ -142,7 +147,13 @@ mod tests {
 
     #[test]
     fn every_key_of_every_file_is_described() {
-        for kind in [FileKind::Vehicle, FileKind::Run, FileKind::Dispersion, FileKind::Stick] {
+        for kind in [
+            FileKind::Vehicle,
+            FileKind::Run,
+            FileKind::Dispersion,
+            FileKind::Stick,
+            FileKind::Import,
+        ] {
             assert_described(schema(kind).as_value(), &format!("{kind:?}"));
         }
         // Gates have open keys, of which the limits are made; the rest is described as well.

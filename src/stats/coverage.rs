@@ -146,6 +146,39 @@ fn students_interval_of_normal_differences_is_exact_and_that_of_the_median_conse
 }
 
 #[test]
+fn intervals_from_replicates_cover_about_as_often_as_they_say() {
+    // Means of ln u over ten replicates of sixteen strata of u, and shares of u v < 0.3.
+    let independent = Drawing::LatinHypercube.independent_replicates(10).unwrap();
+    let trials = 4000;
+    let mut uniform = uniforms(41);
+    let mut misses = [0; 2];
+    let share = 0.3 * (1.0 - 0.3_f64.ln());
+    for _ in 0..trials {
+        let mut values = [vec![], vec![]];
+        for _ in 0..10 {
+            let (mut mean, mut bad) = (0.0, 0.0);
+            for stratum in 0..16 {
+                let u = (f64::from(stratum) + uniform()) / 16.0;
+                mean += u.ln() / 16.0;
+                bad += if u * uniform() < 0.3 { 1.0 / 16.0 } else { 0.0 };
+            }
+            values[0].push(mean);
+            values[1].push(bad);
+        }
+        for ((values, truth), misses) in values.iter().zip([-1.0, share]).zip(&mut misses) {
+            // All replicates alike gives no interval: it cannot miss.
+            if let Ok(found) = of_replicates(values, confidence(0.9), independent)
+                && !(found.lower() <= truth && truth <= found.upper())
+            {
+                *misses += 1;
+            }
+        }
+    }
+    // Means of 16 values are not quite normal: approximate by design, within three hundredths.
+    misses.iter().for_each(|misses| assert_misses_near(*misses, trials, 0.1, 0.03));
+}
+
+#[test]
 fn bootstrap_intervals_of_mean_deviation_and_median_cover_about_as_often_as_they_say() {
     // Uniform values: mean 1/2, deviation 1/√12, median 1/2. The bootstrap is approximate: its
     // coverage at n = 60 is known to be a few percent off, which the slack allows for.

@@ -13,6 +13,10 @@ pub enum Drawing {
     LatinHypercube,
     /// A low-discrepancy sequence.
     LowDiscrepancy,
+    /// Inner campaigns that share their outer draws.
+    Nested,
+    /// Crossings of two samples, for sensitivity indices.
+    Crossed,
     /// Chosen points: a nominal, corners, one at a time, a list from a file.
     Designed,
     /// Kept or found because of their result: search results, cases added because they were bad.
@@ -28,19 +32,35 @@ impl Drawing {
         }
     }
 
+    /// The witness that `replicates` replicates of the design, or outer draws, are independent of each
+    /// other; an error where there are not two or the design has none.
+    pub fn independent_replicates(self, replicates: u64) -> Result<Independent, Error> {
+        match self {
+            Self::LatinHypercube | Self::LowDiscrepancy | Self::Nested if replicates < 2 => {
+                Err(Error::TooFew { found: replicates, needed: 2 })
+            }
+            Self::Independent | Self::LatinHypercube | Self::LowDiscrepancy | Self::Nested => {
+                Ok(Independent(()))
+            }
+            drawing => Err(Error::NotIndependent { drawing }),
+        }
+    }
+
     /// The words that complete "these cases are …".
     pub fn describe(self) -> &'static str {
         match self {
             Self::Independent => "independent draws",
             Self::LatinHypercube => "a Latin hypercube",
             Self::LowDiscrepancy => "a low-discrepancy sequence",
+            Self::Nested => "inner campaigns that share their outer draws",
+            Self::Crossed => "crossings of two samples, which share their draws",
             Self::Designed => "chosen points, not draws",
             Self::Selected => "selected by their result",
         }
     }
 }
 
-/// Witness that the cases of a sample are independent draws; made by [`Drawing::independent`] only.
+/// Witness that the cases of a sample are independent draws; made by [`Drawing`] only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Independent(());
 

@@ -34,8 +34,12 @@ pub enum Method {
     ClopperPearson,
     /// Student's t interval of a mean.
     StudentT,
+    /// Fisher's transformation of a correlation.
+    Fisher,
     /// Distribution-free interval between order statistics.
     OrderStatistics,
+    /// Student's t interval over independent replicates.
+    Replicates,
     /// Percentile bootstrap.
     BootstrapPercentile,
     /// Bias-corrected and accelerated bootstrap.
@@ -48,7 +52,9 @@ impl Method {
         match self {
             Self::ClopperPearson => "clopper_pearson",
             Self::StudentT => "student_t",
+            Self::Fisher => "fisher",
             Self::OrderStatistics => "order_statistics",
+            Self::Replicates => "replicates",
             Self::BootstrapPercentile => "bootstrap_percentile",
             Self::BootstrapBca => "bootstrap_bca",
         }

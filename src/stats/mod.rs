@@ -15,8 +15,10 @@ mod paired;
 mod probability;
 mod proportion;
 mod quantile;
+mod replicates;
 mod root;
 mod selection;
+pub mod sensitivity;
 mod student;
 mod tolerance;
 
@@ -29,7 +31,8 @@ pub use moments::{Moments, RunningMoments};
 pub use paired::PairedDifference;
 pub use probability::{Confidence, Probability};
 pub use proportion::{clopper_pearson, rejects_at_least, rejects_at_most};
-pub use quantile::{Ordered, quantile_of};
+pub use quantile::{Ordered, interval_ranks, quantile_of};
+pub use replicates::of_replicates;
 pub use selection::Selection;
 pub use tolerance::{
     Tails, ToleranceBound, ToleranceInterval, consumers_risk, least_cases, most_exceedances,

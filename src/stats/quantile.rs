@@ -70,19 +70,39 @@ impl Ordered {
         sides: Sides,
         _: Independent,
     ) -> Estimate {
-        let (cases, p) = (self.0.len() as u64, level.get());
-        let (below, above) = sides.risks(confidence);
-        // Values that may lie below the lower end: r − 1, or none.
-        let lower = below
-            .and_then(|risk| greatest(cases, |r| binomial::at_most(r, cases, p) <= risk))
-            .map_or(f64::NEG_INFINITY, |skip| self.0[skip as usize]);
-        // The same from above: P(X ≥ s) = P(n − X ≤ n − s).
-        let upper = above
-            .and_then(|risk| greatest(cases, |r| binomial::at_least(cases - r, cases, p) <= risk))
-            .map_or(f64::INFINITY, |skip| self.0[(cases - 1 - skip) as usize]);
+        let [lower, upper] = ranks_of_ends(self.0.len() as u64, level, confidence, sides);
+        let lower = lower.map_or(f64::NEG_INFINITY, |rank| self.0[rank as usize]);
+        let upper = upper.map_or(f64::INFINITY, |rank| self.0[rank as usize]);
         let point = self.quantile(level);
         Estimate::new(point, (lower, upper), sides, confidence, Method::OrderStatistics)
     }
+}
+
+/// Ranks (from 0) of the ends of [`Ordered::quantile_interval`] among `count` values, for a sample that
+/// is not at hand; none where the sample is too small for an end.
+pub fn interval_ranks(
+    count: u64,
+    level: Probability,
+    confidence: Confidence,
+    _: Independent,
+) -> [Option<u64>; 2] {
+    ranks_of_ends(count, level, confidence, Sides::Two)
+}
+
+fn ranks_of_ends(
+    cases: u64,
+    level: Probability,
+    confidence: Confidence,
+    sides: Sides,
+) -> [Option<u64>; 2] {
+    let p = level.get();
+    let (below, above) = sides.risks(confidence);
+    // Values that may lie below the lower end: r − 1, or none.
+    let lower = below.and_then(|risk| greatest(cases, |r| binomial::at_most(r, cases, p) <= risk));
+    // The same from above: P(X ≥ s) = P(n − X ≤ n − s).
+    let upper =
+        above.and_then(|risk| greatest(cases, |r| binomial::at_least(cases - r, cases, p) <= risk));
+    [lower, upper.map(|skip| cases - 1 - skip)]
 }
 
 /// Quantile of type 7 of `count` values, at least one, of which `value` gives those at the ranks

@@ -2,7 +2,7 @@
 //!
 //! It knows matrices and node positions; what is assembled, labelled or kept is not its business.
 
-use super::orientation;
+use super::orientation::{self, Mass};
 use super::solve::Error;
 use super::weigh::{FREEDOMS, Weighed};
 use faer::linalg::triangular_solve::{
@@ -87,7 +87,7 @@ pub fn free_free(model: &Weighed, limit: f64, count: usize) -> Result<FreeFree, 
             return Err(mechanism(model, held.as_ref()));
         }
     }
-    orientation::orient(elastic, &mut shapes, model);
+    orientation::orient(elastic, &mut shapes, Mass::Full(m), &model.positions_m);
     omega2.truncate(kept);
     shapes.truncate(n, kept);
     clear_round_off(&mut shapes, m);

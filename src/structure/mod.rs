@@ -7,6 +7,7 @@ pub mod beam;
 pub mod character;
 #[cfg(test)]
 mod closed_forms;
+pub mod effective;
 pub mod free_free;
 pub mod label;
 pub mod orientation;

@@ -15,13 +15,47 @@
 //! the first in order of direction (y, z, x), then of position decides. Rotations decide only
 //! where nothing translates.
 
-use super::weigh::{FREEDOMS, Weighed};
-use faer::{Col, Mat};
+use super::weigh::FREEDOMS;
+use faer::{Col, Mat, MatRef};
 use nalgebra::Vector3;
 
 /// Relative difference of squared frequencies under which modes count as repeated: √ε. Vectors of
 /// a closer pair have lost more than half of their digits to round-off.
 pub const CLUSTER: f64 = 1.490_116_119_384_765_6e-8;
+
+/// The mass that weighs shapes over the six freedoms of each node.
+#[derive(Debug, Clone, Copy)]
+pub enum Mass<'a> {
+    /// A mass matrix.
+    Full(MatRef<'a, f64>),
+    /// Its diagonal, where there is nothing else.
+    Diagonal(&'a [f64]),
+}
+
+impl Mass<'_> {
+    fn times(&self, shapes: MatRef<'_, f64>) -> Mat<f64> {
+        match self {
+            Self::Full(mass) => mass * shapes,
+            Self::Diagonal(mass) => {
+                Mat::from_fn(shapes.nrows(), shapes.ncols(), |i, j| mass[i] * shapes[(i, j)])
+            }
+        }
+    }
+
+    fn energy(&self, field: &Col<f64>) -> f64 {
+        match self {
+            Self::Full(mass) => field.transpose() * mass * field,
+            Self::Diagonal(mass) => mass.iter().zip(field.iter()).map(|(m, v)| m * v * v).sum(),
+        }
+    }
+
+    fn at(&self, i: usize) -> f64 {
+        match self {
+            Self::Full(mass) => mass[(i, i)],
+            Self::Diagonal(mass) => mass[i],
+        }
+    }
+}
 
 /// Whether the mode at `i` and the next are repeated. `mu` are the inverse squares of the circular
 /// frequencies of a model with `n` freedoms, descending, each known to `n ε mu[0]`.
@@ -36,18 +70,20 @@ pub(super) fn whole(mu: &[f64], kept: usize, n: usize) -> usize {
     kept + more
 }
 
-/// Orients repeated modes and fixes the sign of all; `mu` as in [`repeated`].
-pub(super) fn orient(mu: &[f64], shapes: &mut Mat<f64>, model: &Weighed) {
+/// Orients repeated modes and fixes the sign of all. `mu` are the inverse squares of the circular
+/// frequencies, descending; modes are columns over the six freedoms of the nodes at `positions_m`,
+/// of unit generalised mass.
+pub fn orient(mu: &[f64], shapes: &mut Mat<f64>, mass: Mass<'_>, positions_m: &[Vector3<f64>]) {
     let n = shapes.nrows();
     let mut start = 0;
     while start < mu.len() {
         let more = (start..).take_while(|&i| repeated(mu, i, n)).count();
         if more > 0 {
-            rotate(shapes, start, more + 1, model);
+            rotate(shapes, start, more + 1, mass, positions_m);
         }
         start += more + 1;
     }
-    let order = freedoms_in_order(model);
+    let order = freedoms_in_order(positions_m);
     for j in 0..shapes.ncols() {
         if deciding(shapes, j, &order) < 0.0 {
             for i in 0..shapes.nrows() {
@@ -58,22 +94,28 @@ pub(super) fn orient(mu: &[f64], shapes: &mut Mat<f64>, model: &Weighed) {
 }
 
 /// Rotates the `size` columns from `start` into their canonical basis.
-fn rotate(shapes: &mut Mat<f64>, start: usize, size: usize, model: &Weighed) {
+fn rotate(
+    shapes: &mut Mat<f64>,
+    start: usize,
+    size: usize,
+    mass: Mass<'_>,
+    positions_m: &[Vector3<f64>],
+) {
     let old = shapes.subcols(start, size).to_owned();
-    let momentum = &model.mass * &old;
+    let momentum = mass.times(old.as_ref());
     // Answers of the subspace to each field: coefficients that any rotation turns alike.
-    let mut answers: Vec<Col<f64>> = fields(model)
+    let mut answers: Vec<Col<f64>> = fields(positions_m)
         .iter()
         .map(|field| {
-            let energy = (field.transpose() * &model.mass * field).max(f64::MIN_POSITIVE);
+            let energy = mass.energy(field).max(f64::MIN_POSITIVE);
             momentum.transpose() * field * faer::Scale(1.0 / energy.sqrt())
         })
         .collect();
     // Should no field reach some direction, the single freedoms do.
     answers.extend(
-        freedoms_in_order(model)
+        freedoms_in_order(positions_m)
             .into_iter()
-            .map(|i| Col::from_fn(size, |j| old[(i, j)] * model.mass[(i, i)].max(0.0).sqrt())),
+            .map(|i| Col::from_fn(size, |j| old[(i, j)] * mass.at(i).max(0.0).sqrt())),
     );
     let mut basis: Vec<Col<f64>> = Vec::new();
     while basis.len() < size {
@@ -105,9 +147,9 @@ fn rotate(shapes: &mut Mat<f64>, start: usize, size: usize, model: &Weighed) {
 const WAVES: usize = 16;
 
 /// Geometric fields over the freedoms, in order of preference.
-fn fields(model: &Weighed) -> Vec<Col<f64>> {
+fn fields(positions_m: &[Vector3<f64>]) -> Vec<Col<f64>> {
     let extent = |axis: usize| {
-        let values = model.positions_m.iter().map(|p| p[axis]);
+        let values = positions_m.iter().map(|p| p[axis]);
         let (least, most) =
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
         (0.5 * (least + most), most - least)
@@ -124,8 +166,8 @@ fn fields(model: &Weighed) -> Vec<Col<f64>> {
     for wave in 0..WAVES {
         for factor in 0..3 {
             for freedom in [1, 2, 0, 3] {
-                let mut field = Col::zeros(FREEDOMS * model.positions_m.len());
-                for (node, p) in model.positions_m.iter().enumerate() {
+                let mut field = Col::zeros(FREEDOMS * positions_m.len());
+                for (node, p) in positions_m.iter().enumerate() {
                     let phase = std::f64::consts::PI * wave as f64 * ((p.x - cx) / lx + 0.5);
                     let side = if factor == 0 { 1.0 } else { lateral(p, factor) };
                     field[FREEDOMS * node + freedom] = phase.cos() * side;
@@ -138,10 +180,10 @@ fn fields(model: &Weighed) -> Vec<Col<f64>> {
 }
 
 /// All freedoms by direction (y, z, x, then rotations likewise), then by position.
-fn freedoms_in_order(model: &Weighed) -> Vec<usize> {
-    let mut nodes: Vec<usize> = (0..model.positions_m.len()).collect();
+fn freedoms_in_order(positions_m: &[Vector3<f64>]) -> Vec<usize> {
+    let mut nodes: Vec<usize> = (0..positions_m.len()).collect();
     nodes.sort_by(|&a, &b| {
-        let (p, q) = (model.positions_m[a], model.positions_m[b]);
+        let (p, q) = (positions_m[a], positions_m[b]);
         p.x.total_cmp(&q.x).then(p.y.total_cmp(&q.y)).then(p.z.total_cmp(&q.z))
     });
     [1, 2, 0, 4, 5, 3]

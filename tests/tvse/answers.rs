@@ -10,14 +10,14 @@ use tvse::dynamics::{Layout, Model};
 use tvse::io::scenario::{self, Loaded};
 use tvse::scenario::dispersion;
 use tvse::structure::Thresholds;
-use tvse::vehicle::{Modal, Mode, ModeSet, Vehicle};
+use tvse::vehicle::{Law, Modal, Mode, ModeSet, Vehicle};
 
 const RUN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/runs/smoke.toml");
 /// As the solver's own check of its poles: n ε times the greatest pole, times a modest factor.
 const BACKWARD: f64 = 1e4;
 
 fn loaded() -> Loaded {
-    scenario::load(Path::new(RUN)).unwrap()
+    scenario::load(Path::new(RUN), scenario::Reach::Study).unwrap()
 }
 
 /// No structural and no actuator damping.
@@ -25,14 +25,23 @@ fn undamped(mut vehicle: Vehicle) -> Vehicle {
     vehicle.structural_damping = 0.0;
     for engine in &mut vehicle.engines {
         engine.bearing_damping_n_m_s_rad = 0.0;
-        engine.actuators.iter_mut().for_each(|actuator| actuator.law.damping_ratio = 0.0);
+        for actuator in &mut engine.actuators {
+            let Law::SecondOrder(law) = &mut actuator.law else { panic!("another kind") };
+            law.damping_ratio = 0.0;
+        }
     }
     vehicle
 }
 
 /// The nominal case of `definition` with the one `variant`, every engine that `gimballed` names.
 fn nominal(definition: &Definition, variant: Variant, gimballed: &str) -> Definition {
-    let nominal = Population { name: "nominal".into(), cases: 1, fixed: vec![], drawn: false };
+    let nominal = Population {
+        name: "nominal".into(),
+        cases: 1,
+        fixed: vec![],
+        drawn: false,
+        scheme: Default::default(),
+    };
     let engines = definition.gimballed.len();
     let gimballed = match gimballed {
         "none" => vec![false; engines],
@@ -263,7 +272,7 @@ fn integrated(vehicle: &Vehicle, definition: &Definition) -> (Modal, String) {
 pub fn integrated_study() -> Study {
     let study = Study::new();
     study.edit("vehicles/sls-like/vehicle.toml", "damping_ratio = 0.005", "damping_ratio = 0.0");
-    let loaded = scenario::load(&study.path("runs/smoke.toml")).unwrap();
+    let loaded = scenario::load(&study.path("runs/smoke.toml"), scenario::Reach::Study).unwrap();
     let (modal, label) = integrated(&loaded.vehicle.vehicle, &loaded.definition);
     let folder = study.path("vehicles/sls-like/integrated");
     tvse::io::package::write(&folder, &modal, &Thresholds::default(), false).unwrap();
@@ -277,7 +286,8 @@ pub fn integrated_study() -> Study {
 #[test]
 fn the_reduced_and_the_integrated_reference_vehicle_have_the_same_poles() {
     let study = integrated_study();
-    let integrated = scenario::load(&study.path("runs/smoke.toml")).unwrap();
+    let integrated =
+        scenario::load(&study.path("runs/smoke.toml"), scenario::Reach::Study).unwrap();
     assert!(integrated.vehicle.vehicle.engines.iter().all(|engine| engine.in_modes));
     let reduced = loaded();
     let mut vehicle = reduced.vehicle.vehicle;

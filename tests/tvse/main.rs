@@ -7,8 +7,12 @@
 mod answers;
 mod bad_input;
 mod commands;
+mod corpus;
 mod damage;
 mod failures;
+mod import;
+mod outside;
+mod parsers;
 mod repeatability;
 mod schema;
 mod stopping;

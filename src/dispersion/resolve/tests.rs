@@ -448,5 +448,10 @@ fn the_meaning_of_a_table_does_not_depend_on_the_order_of_its_rows() {
     let vehicle = vehicle();
     let straight = good(&rows.concat(), &vehicle);
     let reversed = good(&rows.iter().rev().cloned().collect::<String>(), &vehicle);
-    assert_eq!(straight, reversed);
+    // But for the dimensions of Sobol sequences, which follow the order of the table.
+    let draws = |dispersion: &Dispersion| -> Vec<Draw> {
+        dispersion.draws().iter().map(|d| Draw { dimension: 0, ..d.clone() }).collect()
+    };
+    assert_eq!(draws(&straight), draws(&reversed));
+    assert_eq!(straight.combinations(), reversed.combinations());
 }

@@ -128,6 +128,7 @@ fn a_truncated_a_swapped_and_a_missing_table_are_damage() {
         contains_tanks: Vec::new(),
         labels: None,
         blake3: BTreeMap::new(),
+        import: None,
     });
     files::write(&place.path().join(HEADER), header.unwrap().as_bytes()).unwrap();
     let problems = read(place.path()).unwrap_err();

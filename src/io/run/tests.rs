@@ -175,9 +175,9 @@ fn an_unfinished_run_another_version_and_a_cut_manifest_are_damage() {
         assert_eq!(problems.kind(), Kind::Damage);
         assert!(problems.to_string().contains(manifest::FILE));
     }
-    fs::write(&file, text.replace("\"schema_version\": 1", "\"schema_version\": 99")).unwrap();
+    fs::write(&file, text.replace("\"schema_version\": 2", "\"schema_version\": 99")).unwrap();
     let problems = Run::open(&path).unwrap_err().to_string();
-    assert!(problems.contains("schema_version: found 99; allowed: 1"), "{problems}");
+    assert!(problems.contains("schema_version: found 99; allowed: 2"), "{problems}");
     let greedy = text.replace("\"cases\": 5", "\"cases\": 9007199254740991");
     assert_ne!(greedy, text);
     fs::write(&file, greedy).unwrap();

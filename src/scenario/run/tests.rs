@@ -18,7 +18,7 @@ fn read(text: &str) -> Result<(Run, Dispersion), Problems> {
     let vehicle = vehicle();
     let dispersion = dispersion::read("d.toml", DISPERSION, &vehicle.vehicle)?;
     let (file, findings) = table::read::<RunFile>("run.toml", text)?;
-    let run = resolve(&file, "reference", Some(&vehicle), Some(&dispersion), findings)?;
+    let run = resolve(&file, "reference", Some(&vehicle), Some(&dispersion), None, findings)?;
     Ok((run, dispersion))
 }
 
@@ -161,7 +161,8 @@ fn a_mode_without_a_label_at_a_flight_time_is_refused() {
         set.modes[1].label = "m099".into();
     }
     let (file, findings) = table::read::<RunFile>("run.toml", REFERENCE).unwrap();
-    let problems = resolve(&file, "r", Some(&vehicle), None, findings).expect_err("a problem").0;
+    let problems =
+        resolve(&file, "r", Some(&vehicle), None, None, findings).expect_err("a problem").0;
     assert_eq!((problems.len(), problems[0].key.as_str()), (1, "modes[0]"));
     assert!(problems[0].found.contains("112 s"), "{problems:?}");
 }
@@ -197,4 +198,62 @@ proptest! {
         // Only that it returns counts here; what it finds is tested above.
         let _ = read(&text);
     }
+}
+
+/// The reference run with this plan instead of its number of cases.
+fn planned(plan: &str) -> String {
+    format!("{}\n[plan]\n{plan}\n", edited("cases = 2000", ""))
+}
+
+fn scheme(text: &str) -> (crate::dispersion::Scheme, u64) {
+    let (run, _) = read(text).unwrap_or_else(|problems| panic!("{problems}"));
+    let population = &run.definition.populations[1];
+    (population.scheme.clone(), population.cases)
+}
+
+#[test]
+fn every_plan_reads_with_its_number_of_cases() {
+    use crate::dispersion::Scheme;
+    let free = |plan: &str| scheme(&format!("{REFERENCE}\n[plan]\n{plan}\n"));
+    assert_eq!(free("kind = \"monte_carlo\""), (Scheme::MonteCarlo, 2000));
+    assert_eq!(
+        free("kind = \"latin_hypercube\""),
+        (Scheme::LatinHypercube { replicates: 1 }, 2000)
+    );
+    assert_eq!(free("kind = \"sobol\"\nreplicates = 8"), (Scheme::Sobol { replicates: 8 }, 2000));
+    let one =
+        "kind = \"one_at_a_time\"\nat = [-3, 3]\nkeys = [\"structure.*\", \"booster.*.thrust\"]";
+    let (_, dispersion) = read(REFERENCE).unwrap();
+    let thrusts = |d: &Dispersion| {
+        d.draws()
+            .iter()
+            .filter(|d| d.key.starts_with("booster") && d.key.contains("thrust"))
+            .count()
+    };
+    let problems = keys(&planned(one));
+    assert_eq!(problems, ["plan.keys[0]"]);
+    let (_, cases) = scheme(&planned(&one.replace("\"structure.*\", ", "")));
+    assert_eq!(cases, 2 * thrusts(&dispersion) as u64);
+    let (corners, cases) = scheme(&planned("kind = \"corners\"\nresolution = 4"));
+    let Scheme::Corners { draws, resolution: Some(4), .. } = corners else { panic!("{corners:?}") };
+    // Resolution IV takes as many runs as the power of two at or above twice the factors.
+    assert_eq!(cases, 2 * (draws.len() as u64).next_power_of_two());
+    let (_, cases) = scheme(&planned("kind = \"saltelli\"\nrows = 3"));
+    assert_eq!(cases, 3 * (dispersion.draws().len() as u64 + 2));
+}
+
+#[test]
+fn plans_that_cannot_be_are_refused_with_their_keys() {
+    let with = |plan: &str| keys(&format!("{REFERENCE}\n[plan]\n{plan}\n"));
+    assert_eq!(with("kind = \"sobol\"\nreplicates = 7"), ["cases"]);
+    assert_eq!(with("kind = \"sobol\"\nreplicates = 0"), ["plan.replicates"]);
+    assert_eq!(with("kind = \"corners\"\nresolution = 3"), ["cases"]);
+    assert_eq!(with("kind = \"lhs\""), ["plan"]);
+    assert_eq!(keys(&edited("cases = 2000", "")), ["cases"]);
+    assert_eq!(keys(&planned("kind = \"corners\"")), ["plan.keys"]);
+    assert_eq!(keys(&planned("kind = \"one_at_a_time\"\nat = [1, 1]")), ["plan.at"]);
+    let nested =
+        "kind = \"nested\"\nouter = 5\ninner = 20\nallowed_share_unstable = 0.1\nrisk = 0.1";
+    // 22 good cases are needed, and the reference dispersion has no classes.
+    assert_eq!(keys(&planned(nested)), ["plan.inner", "plan.kind"]);
 }
