@@ -6,6 +6,7 @@ pub mod derivative;
 pub mod draw;
 mod draw_servo;
 pub mod evaluator;
+pub mod influence;
 pub mod metric;
 pub mod nested;
 pub mod outline;

@@ -70,6 +70,8 @@ pub struct WorstCase {
     pub values: Vec<(usize, f64)>,
     /// Independent normal score of every draw, σ; `None` where it has none.
     pub scores: Vec<Option<f64>>,
+    /// Change of the objective per σ of every draw there; empty for a case of the sample.
+    pub by_score: Vec<f64>,
     /// The objective; less is worse.
     pub objective: f64,
     /// The less stable pole of the mode, rad/s: real and imaginary part.

@@ -12,6 +12,7 @@ pub mod error;
 pub mod gate;
 pub mod how_many;
 pub mod import;
+pub mod influence;
 pub mod init;
 pub mod interrupt;
 pub mod merge;
@@ -32,6 +33,7 @@ pub mod statistics;
 pub mod status;
 pub mod submit;
 pub mod summary;
+pub mod worst;
 
 pub use error::Error;
 
@@ -78,6 +80,8 @@ enum Command {
     Compare(compare::Args),
     Gate(gate::Args),
     Replay(replay::Args),
+    Worst(worst::Args),
+    Influence(influence::Args),
     HowMany(how_many::Args),
     Planar(planar::Args),
     Actuator(actuator::Args),
@@ -140,6 +144,8 @@ pub fn run() -> ExitCode {
         Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
+        Command::Worst(args) => worst::run(args, &mut out),
+        Command::Influence(args) => influence::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),
         Command::Actuator(args) => actuator::run(args, &mut out),

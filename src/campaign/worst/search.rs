@@ -83,6 +83,7 @@ struct Found {
     flight_time: usize,
     z: Vec<f64>,
     value: f64,
+    gradient: Vec<f64>,
     pole: nalgebra::Complex<f64>,
     gap: Option<f64>,
     switches: usize,
@@ -189,6 +190,7 @@ pub fn search(
             flight_time: found.flight_time,
             values: dispersion.values_at(&scores),
             scores,
+            by_score: found.gradient.clone(),
             objective: found.value,
             pole: [found.pole.re, found.pole.im],
             gap: found.gap,
@@ -228,7 +230,8 @@ impl Searcher<'_> {
 
     fn found(&self, z: Vec<f64>, at: &At<Spot>) -> Found {
         let (flight_time, pole) = (self.objective.flight_time, at.point.pole);
-        Found { flight_time, z, value: at.value, pole, gap: None, switches: 0 }
+        let gradient = self.masked(&at.gradient);
+        Found { flight_time, z, value: at.value, gradient, pole, gap: None, switches: 0 }
     }
 
     /// Every key at the side that its derivative calls adverse, first that at the median, then those at the
