@@ -3,10 +3,11 @@
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use tvse::campaign::{Definition, Evaluator, NozzleJet, Population, Slope, Variant};
+use tvse::campaign::{Definition, Evaluator, LoopPlan, NozzleJet, Population, Slope, Variant};
 use tvse::dispersion::Sampler;
-use tvse::dynamics::Model;
+use tvse::dynamics::{Feedback, Model};
 use tvse::io::scenario::Reach;
+use tvse::margins::Settings;
 use tvse::modal::{Solver, identify};
 use tvse::structure::{self, Selection, Stick};
 use tvse::vehicle::Vehicle;
@@ -61,6 +62,7 @@ fn definition(vehicle: &Vehicle) -> Definition {
         gimballed: vehicle.engines.iter().map(|e| e.group == "booster").collect(),
         exchange_ratio: 0.5,
         sensitivity: None,
+        margins: None,
     }
 }
 
@@ -131,5 +133,38 @@ fn layers(criterion: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, layers);
+/// What the loops cost: an evaluation with the loops open, closed, and closed with its margins.
+fn loops(criterion: &mut Criterion) {
+    let vehicle =
+        tvse::io::scenario::vehicle(VEHICLE.as_ref(), Reach::Study).expect("read").resolved.vehicle;
+    let dispersion =
+        tvse::scenario::dispersion::read("reference.toml", DISPERSION, &vehicle).expect("read");
+    let mut group = criterion.benchmark_group("loops");
+    for (name, feedback, margins) in [
+        ("open", Feedback::Open, false),
+        ("closed", Feedback::Closed, false),
+        ("closed with margins", Feedback::Closed, true),
+    ] {
+        let mut definition = definition(&vehicle);
+        let variant = &mut definition.variants[0];
+        (variant.rigid_body, variant.slosh, variant.feedback) = (true, true, feedback);
+        definition.margins = margins.then(|| LoopPlan {
+            settings: Settings::default(),
+            variants: vec![0],
+            envelope_hz: Vec::new(),
+        });
+        let sampler = Sampler::new(&dispersion, definition.seed);
+        let evaluator = Evaluator::new(&vehicle, &sampler, &definition, false).expect("prepared");
+        let mut case = 0;
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                case = (case + 1) % 1000;
+                evaluator.evaluate(1, case)
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, layers, loops);
 criterion_main!(benches);

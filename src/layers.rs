@@ -7,11 +7,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules from the lowest layer up; those of one layer do not name each other.
-const LAYERS: [&[&str]; 9] = [
+const LAYERS: [&[&str]; 10] = [
     &["problem", "spelling", "stats"],
     &["vehicle"],
     &["dynamics", "dispersion", "structure", "fem"],
     &["modal", "import"],
+    &["margins"],
     &["campaign"],
     &["gate"],
     &["scenario", "report"],
@@ -20,10 +21,11 @@ const LAYERS: [&[&str]; 9] = [
 ];
 
 /// Third parties and the modules that may name them.
-const WALLS: [(&str, &[&str]); 8] = [
+const WALLS: [(&str, &[&str]); 9] = [
     ("faer::linalg", &["modal", "structure"]),
     ("arrow::", &["io"]),
     ("parquet::", &["io"]),
+    ("hdf5_reader::", &["fem"]),
     ("clap::", &["cli"]),
     ("rayon::", &["campaign"]),
     ("rand::", &["dispersion"]),

@@ -16,6 +16,7 @@ pub mod fem;
 pub mod gate;
 pub mod import;
 pub mod io;
+pub mod margins;
 pub mod modal;
 pub mod problem;
 pub mod report;

@@ -60,6 +60,8 @@ pub fn adverse_sides(
         populations: draws.iter().flat_map(sides).collect(),
         variants: vec![definition.variants[variant].clone()],
         modes: vec![definition.modes[mode].clone()],
+        margins: None,
+        sensitivity: None,
         ..definition.clone()
     };
     let sampler = Sampler::new(dispersion, definition.seed);

@@ -4,6 +4,7 @@ use crate::dispersion::Scheme;
 pub use crate::dynamics::{Feedback, NozzleJet};
 use crate::stats::Drawing;
 
+use crate::margins::Settings;
 use serde::{Deserialize, Serialize};
 
 /// Most cases of a population: beyond any campaign, and small enough for every count and column.
@@ -49,6 +50,24 @@ pub struct Variant {
     /// Set of actuators in the place of the engines' own; engines without it keep theirs.
     #[serde(default)]
     pub actuators: Option<String>,
+}
+
+/// Which flight control loops are assessed, and where.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct LoopPlan {
+    /// What is asked of the loops and where they are looked at.
+    pub settings: Settings,
+    /// Variants whose loops are assessed (indices), ascending.
+    pub variants: Vec<usize>,
+    /// Frequencies of the envelopes, Hz, ascending; empty for none.
+    pub envelope_hz: Vec<f64>,
+}
+
+impl LoopPlan {
+    /// Whether the loops of a variant are assessed.
+    pub fn holds(&self, variant: usize) -> bool {
+        self.variants.contains(&variant)
+    }
 }
 
 /// A set of cases evaluated in one run; tables hold populations in this order.
@@ -110,6 +129,9 @@ pub struct Definition {
     /// Where derivatives are stored, if anywhere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<SensitivityRule>,
+    /// Loops to be assessed, if any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub margins: Option<LoopPlan>,
 }
 
 /// The evaluations whose poles are stored with their derivatives.
@@ -133,11 +155,19 @@ impl SensitivityRule {
 }
 
 impl Definition {
-    /// Adds cases to the dispersed population and to every corner's Monte Carlo.
+    /// Adds cases to the dispersed population and to every corner's Monte Carlo, whose plans have
+    /// been asked whether they can be extended.
     pub fn add_cases(&mut self, more: u64) {
-        let free = |p: &&mut Population| p.drawn && !p.scheme.has_own_cases();
-        for population in self.populations.iter_mut().filter(free) {
+        for population in self.populations.iter_mut().filter(|p| p.drawn) {
             population.cases = population.cases.saturating_add(more).min(MOST_CASES);
+        }
+    }
+
+    /// Takes away the number of drawn cases, where it does not change a case: what is left is common to
+    /// all parts and lengths of a campaign.
+    pub fn leave_cases_open(&mut self) {
+        for p in self.populations.iter_mut().filter(|p| p.drawn && p.scheme.keeps_first_cases()) {
+            p.cases = 0;
         }
     }
 

@@ -5,12 +5,14 @@
 
 use super::derivative::Place;
 use super::draw::Slots;
+use super::loops::{Loops, OpenLoop};
 use super::plant::Extent;
 use super::{
     Branch, Definition, Evaluation, Failure, FailureKind, Pole, Population, Record, Variant,
 };
 use crate::dispersion::{Affine, Cursor, Dispersion, Draws, Sampler};
 use crate::dynamics::{DrawnVehicle, Effects, Model, Part, Plant};
+use crate::margins::Assessment;
 use crate::modal::{self, Reference, Solver, eigen, identify};
 use crate::vehicle::Vehicle;
 use nalgebra::Complex;
@@ -74,6 +76,8 @@ pub struct AtVariant {
     pub nominal: Model,
     /// Nominal pole of every mode of interest.
     pub references: Vec<Reference>,
+    /// The flight control loops, where they are assessed.
+    loops: Option<OpenLoop>,
 }
 
 /// What is prepared at one flight time.
@@ -142,6 +146,8 @@ pub struct Followed {
 pub struct View<'a> {
     /// Plant of the evaluation.
     pub plant: &'a Plant,
+    /// The drawn vehicle; meaningless where the draw failed.
+    pub drawn: &'a DrawnVehicle,
     /// Model of the evaluation; meaningless where the draw failed.
     pub model: &'a Model,
     /// What was found.
@@ -203,20 +209,15 @@ impl<'a> Evaluator<'a> {
     /// Like [`Evaluator::evaluate`], showing every evaluation with its model to `look`.
     pub fn visit(&self, population: usize, case: u64, mut look: impl FnMut(&View<'_>)) -> Record {
         let mut workspace = self.take();
-        let Workspace { buffers, cursor, vehicle, poles } = &mut workspace;
-        let rule = &self.definition.populations[population];
-        let draws = if rule.scheme.is_monte_carlo() {
-            cursor.draw(case, &rule.fixed, rule.drawn)
-        } else {
-            cursor.draw_planned(case)
-        };
+        let Workspace { buffers: all_buffers, cursor, vehicle, poles } = &mut workspace;
+        let draws = self.draws(cursor, population, case);
         let mut evaluations = Vec::new();
         for (flight_time, at) in self.times.iter().enumerate() {
             let parameters = self.sampler.dispersion().parameters();
             let drawn = at.slots.draw(self.vehicle, parameters, &draws.effects, vehicle);
             for variant in 0..at.variants.len() {
                 let plant = at.plant(variant);
-                let buffers = Buffers::of(buffers, plant.layout.coordinates());
+                let buffers = Buffers::of(all_buffers, plant.layout.coordinates());
                 let sensitive = self.definition.sensitivity.as_ref();
                 let sensitive =
                     sensitive.is_some_and(|rule| rule.covers(variant, flight_time, case));
@@ -225,14 +226,79 @@ impl<'a> Evaluator<'a> {
                     .clone()
                     .and_then(|()| self.solve(at, &place, (variant, sensitive), buffers, poles));
                 let null_poles = buffers.model.null_states.len();
-                let evaluation = Evaluation { variant, flight_time, null_poles, outcome };
-                look(&View { plant, model: &buffers.model, evaluation: &evaluation });
+                let mut evaluation =
+                    Evaluation { variant, flight_time, null_poles, outcome, loops: None };
+                let model = &buffers.model;
+                look(&View { plant, drawn: vehicle, model, evaluation: &evaluation });
+                evaluation.loops = self.loops(at, variant, &drawn, vehicle, all_buffers, poles);
                 evaluations.push(evaluation);
             }
         }
         let (values, scores) = (draws.values.clone(), draws.scores.clone());
         self.workspaces.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
         Record { population, case, values, scores, evaluations }
+    }
+
+    /// The draws of a case.
+    fn draws<'b>(&self, cursor: &'b mut Cursor<'_>, population: usize, case: u64) -> &'b Draws {
+        let rule = &self.definition.populations[population];
+        if rule.scheme.is_monte_carlo() {
+            cursor.draw(case, &rule.fixed, rule.drawn)
+        } else {
+            cursor.draw_planned(case)
+        }
+    }
+
+    /// The loops of a drawn vehicle in a variant, where they are assessed; `poles` are those of the
+    /// variant, if it was solved.
+    fn loops(
+        &self,
+        at: &AtTime,
+        variant: usize,
+        drawn: &Result<(), Failure>,
+        vehicle: &DrawnVehicle,
+        buffers: &mut Vec<Buffers>,
+        poles: &[Complex<f64>],
+    ) -> Option<Result<Loops, Failure>> {
+        let (open, plan) =
+            (at.variants[variant].loops.as_ref()?, self.definition.margins.as_ref()?);
+        let Buffers { model, solver, .. } = Buffers::of(buffers, open.coordinates());
+        let found = drawn
+            .clone()
+            .and_then(|()| open.assess(vehicle, model, solver, poles, plan, &plan.envelope_hz));
+        Some(found.map(|found| open.store(&found, model, solver, plan)))
+    }
+
+    /// Assesses the loops of one case at a flight time and in a variant (indices of the definition), with
+    /// its whole curve; none where the run does not assess them.
+    ///
+    /// # Errors
+    /// An impossible draw, or loops that cannot be followed.
+    pub fn assess(
+        &self,
+        population: usize,
+        case: u64,
+        flight_time: usize,
+        variant: usize,
+    ) -> Result<Option<Assessment>, Failure> {
+        let at = &self.times[flight_time];
+        let (Some(open), Some(plan)) = (&at.variants[variant].loops, &self.definition.margins)
+        else {
+            return Ok(None);
+        };
+        let mut workspace = self.take();
+        let Workspace { buffers, cursor, vehicle, poles } = &mut workspace;
+        let draws = self.draws(cursor, population, case);
+        let parameters = self.sampler.dispersion().parameters();
+        at.slots.draw(self.vehicle, parameters, &draws.effects, vehicle)?;
+        // The poles about which the grid is refined, as in the run.
+        let closed = Buffers::of(buffers, at.plant(variant).layout.coordinates());
+        let place = self.place(at, variant, draws, &[], vehicle);
+        if self.solve(at, &place, (variant, false), closed, poles).is_err() {
+            poles.clear();
+        }
+        let Buffers { model, solver, .. } = Buffers::of(buffers, open.coordinates());
+        open.assess(vehicle, model, solver, poles, plan, &plan.envelope_hz).map(Some)
     }
 
     /// Builds the model of the nominal vehicle at a flight time and in a variant (indices of the
@@ -491,17 +557,22 @@ fn at_time(
     let variants = definition
         .variants
         .iter()
-        .map(|variant| {
+        .enumerate()
+        .map(|(index, variant)| {
             let extent = Extent::of(variant);
             let plant = extents.iter().position(|e| *e == extent).unwrap_or_default();
-            at_variant(&plants[plant], plant, &nominal, variant, &labels).map_err(|(mode, lost)| {
-                Error::Lost {
+            let mut prepared = at_variant(&plants[plant], plant, &nominal, variant, &labels)
+                .map_err(|(mode, lost)| Error::Lost {
                     mode: definition.modes[mode].clone(),
                     time_s,
                     variant: variant.name.clone(),
                     lost,
-                }
-            })
+                })?;
+            if definition.margins.as_ref().is_some_and(|plan| plan.holds(index)) {
+                let effects = prepared.effects;
+                prepared.loops = Some(OpenLoop::new(vehicle, set, definition, variant, effects)?);
+            }
+            Ok::<_, Error>(prepared)
         })
         .collect::<Result<Vec<_>, _>>()?;
     Ok(AtTime { flight_time_s: time_s, plants, slots, nominal, labels, variants })
@@ -537,5 +608,5 @@ fn at_variant(
     }
     let mut model = Model::zeros(size);
     plant.assemble(nominal, &effects, &mut model);
-    Ok(AtVariant { plant: plant_index, effects, nominal: model, references })
+    Ok(AtVariant { plant: plant_index, effects, nominal: model, references, loops: None })
 }

@@ -183,7 +183,7 @@ fn build(definition: &Definition, name: &dyn Fn(&Line, usize, usize) -> String) 
 }
 
 /// A name as part of a column name, `[a-z0-9_]`.
-fn word(name: &str) -> String {
+pub(super) fn word(name: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' };
     name.chars().map(plain).collect()
 }
@@ -302,6 +302,7 @@ mod tests {
                 flight_time,
                 null_poles: 0,
                 outcome,
+                loops: None,
             })
             .collect();
         Record { population: 0, case: 0, values: vec![], scores: vec![], evaluations }

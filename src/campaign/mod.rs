@@ -7,6 +7,8 @@ pub mod draw;
 mod draw_servo;
 pub mod evaluator;
 pub mod influence;
+pub mod loop_metric;
+pub mod loops;
 pub mod metric;
 pub mod nested;
 pub mod outline;
@@ -23,7 +25,9 @@ pub mod summary;
 pub mod synthetic;
 pub mod worst;
 
-pub use definition::{Definition, NozzleJet, Population, SensitivityRule, Slope, Variant};
+pub use definition::{
+    Definition, LoopPlan, NozzleJet, Population, SensitivityRule, Slope, Variant,
+};
 pub use derivative::Sensitivity;
 pub use evaluator::Evaluator;
 pub use outline::{DrawColumn, Input, Outline, StoredPoles};

@@ -118,7 +118,7 @@ impl Outline {
     /// Digest of all but the number of drawn cases: what two parts of one campaign have in common.
     pub fn identity(&self) -> String {
         let mut open = self.clone();
-        open.definition.set_cases(0);
+        open.definition.leave_cases_open();
         let text = serde_json::to_string(&open).expect("an outline has text keys only");
         blake3::hash(text.as_bytes()).to_hex().to_string()
     }
@@ -127,7 +127,7 @@ impl Outline {
     pub fn differences(&self, other: &Self) -> Vec<(String, String, String)> {
         let open = |outline: &Self| {
             let mut open = outline.clone();
-            open.definition.set_cases(0);
+            open.definition.leave_cases_open();
             let inputs = std::mem::take(&mut open.inputs);
             let value = serde_json::to_value(&open).expect("an outline has text keys only");
             let mut found = BTreeMap::new();

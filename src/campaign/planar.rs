@@ -126,6 +126,7 @@ impl PlanarCampaign {
             gimballed: vec![true],
             exchange_ratio: 0.5,
             sensitivity: None,
+            margins: None,
         };
         let draws = self.draws.iter().map(|(scatter, _)| scatter.column()).collect();
         Outline::new(definition, StoredPoles::Named, draws, inputs)
@@ -145,7 +146,8 @@ impl PlanarCampaign {
             scores.push(position.map(|position| position.score()));
         }
         let outcome = least_damped(parameters).map(|pole| vec![pole]);
-        let evaluation = Evaluation { variant: 0, flight_time: 0, null_poles: 0, outcome };
+        let evaluation =
+            Evaluation { variant: 0, flight_time: 0, null_poles: 0, outcome, loops: None };
         Record { population, case, values, scores, evaluations: vec![evaluation] }
     }
 }

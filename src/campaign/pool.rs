@@ -190,12 +190,14 @@ fn guarded(
     record.map(|record| record.checked(definition.modes.len())).unwrap_or_else(|payload| {
         let failure = Failure::new(FailureKind::Panic, message(payload.as_ref()));
         let evaluations = (0..definition.flight_times_s.len()).flat_map(|flight_time| {
-            let outcome: Result<_, Failure> = Err(failure.clone());
+            let failure = failure.clone();
+            let plan = definition.margins.as_ref();
             (0..definition.variants.len()).map(move |variant| Evaluation {
                 null_poles: 0,
                 variant,
                 flight_time,
-                outcome: outcome.clone(),
+                outcome: Err(failure.clone()),
+                loops: plan.filter(|plan| plan.holds(variant)).map(|_| Err(failure.clone())),
             })
         });
         Record {

@@ -3,6 +3,7 @@
 //! A record is a value; how it is stored is decided in `io`.
 
 use super::derivative::Sensitivity;
+use super::loops::Loops;
 use crate::dynamics::Part;
 use nalgebra::Complex;
 
@@ -23,13 +24,15 @@ pub enum FailureKind {
     Residual,
     /// A named mode could not be followed from the nominal to the case.
     IdentityLost,
+    /// The response of a flight control loop could not be followed.
+    Loop,
     /// The program panicked inside the case.
     Panic,
 }
 
 impl FailureKind {
     /// Every kind, in the order of declaration.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Draw,
         Self::Build,
         Self::SingularMass,
@@ -37,6 +40,7 @@ impl FailureKind {
         Self::NonFinite,
         Self::Residual,
         Self::IdentityLost,
+        Self::Loop,
         Self::Panic,
     ];
 
@@ -50,6 +54,7 @@ impl FailureKind {
             Self::NonFinite => "non_finite",
             Self::Residual => "residual",
             Self::IdentityLost => "identity_lost",
+            Self::Loop => "loop",
             Self::Panic => "panic",
         }
     }
@@ -154,6 +159,8 @@ pub struct Evaluation {
     pub null_poles: usize,
     /// The poles asked for, named modes first in the order of the run definition, or a failure.
     pub outcome: Result<Vec<Pole>, Failure>,
+    /// The flight control loops, where they are assessed.
+    pub loops: Option<Result<Loops, Failure>>,
 }
 
 /// One case: the draws of one dispersed vehicle and all its evaluations.
@@ -172,6 +179,14 @@ pub struct Record {
     pub evaluations: Vec<Evaluation>,
 }
 
+impl Evaluation {
+    /// Why there are no poles, or else no margins.
+    pub fn failure(&self) -> Option<&Failure> {
+        let loops = self.loops.as_ref().and_then(|loops| loops.as_ref().err());
+        self.outcome.as_ref().err().or(loops)
+    }
+}
+
 impl Record {
     /// Whether a named mode is unstable in some evaluation.
     pub fn unstable(&self) -> bool {
@@ -181,7 +196,7 @@ impl Record {
 
     /// The first failure of the case, in the order of its evaluations.
     pub fn failure(&self) -> Option<&Failure> {
-        self.evaluations.iter().find_map(|e| e.outcome.as_ref().err())
+        self.evaluations.iter().find_map(Evaluation::failure)
     }
 
     /// The record with every evaluation that lacks a primary pole of one of the `modes` named

@@ -3,8 +3,11 @@
 //! How rows become columns is decided in `io`.
 
 use super::definition::Definition;
+use super::loop_metric;
+use super::loops::{CurvePoint, Loops, NamedPeak};
 use super::metric::ReducedCase;
 use super::record::{Failure, Pole, Record};
+use crate::margins::{AXES, AxisMargins};
 
 /// One row of the `cases` table.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +22,8 @@ pub struct CaseRow {
     pub scores: Vec<Option<f64>>,
     /// What the scalar metrics are taken from.
     pub reduced: ReducedCase,
+    /// Values of the loop metrics, in the order of their registry.
+    pub loops: Vec<Option<f64>>,
     /// The first failure of the case.
     pub failure: Option<Failure>,
 }
@@ -42,10 +47,90 @@ pub struct ModeRow {
     pub outcome: Result<Pole, Failure>,
 }
 
+/// One row of a table of loops: a fact about one axis of one evaluation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoopRow<T> {
+    /// Index of the population.
+    pub population: usize,
+    /// Case index inside the population.
+    pub case: u64,
+    /// Index of the variant.
+    pub variant: usize,
+    /// Index of the flight time.
+    pub flight_time: usize,
+    /// Index of the axis.
+    pub axis: usize,
+    /// The fact.
+    pub fact: T,
+}
+
+/// Margins of an axis and the closed loop's unstable poles, or why there are none.
+pub type Margins = Result<(AxisMargins, i64), Failure>;
+
+/// A row of `margins`.
+pub type MarginRow = LoopRow<Margins>;
+/// A row of `loop_modes`: a resonance, none where the axis has none.
+pub type PeakRow = LoopRow<Option<NamedPeak>>;
+/// A row of `loop_curves`: index of a frequency and the loop there, none where the evaluation failed.
+pub type CurveRow = LoopRow<Option<(usize, CurvePoint)>>;
+
+/// The rows of a record in the tables of loops.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LoopRows {
+    /// `margins`: every axis of every assessed evaluation.
+    pub margins: Vec<MarginRow>,
+    /// `loop_modes`: resonances by axis; one row without where there is none.
+    pub peaks: Vec<PeakRow>,
+    /// `loop_curves`: by axis the index of a frequency and the loop there; one row without where the
+    /// evaluation failed.
+    pub curves: Vec<CurveRow>,
+}
+
+/// Every item, or `None` once where there are none.
+fn or_none<T>(items: impl Iterator<Item = T>) -> impl Iterator<Item = Option<T>> {
+    let mut items = items.peekable();
+    let none = items.peek().is_none().then_some(None);
+    items.map(Some).chain(none)
+}
+
+/// The rows of a record's loops.
+pub fn loop_rows(record: &Record) -> LoopRows {
+    let mut rows = LoopRows::default();
+    let (population, case) = (record.population, record.case);
+    for evaluation in &record.evaluations {
+        let Some(loops) = &evaluation.loops else { continue };
+        let (variant, flight_time) = (evaluation.variant, evaluation.flight_time);
+        fn row<T>(
+            [population, variant, flight_time, axis]: [usize; 4],
+            case: u64,
+            fact: T,
+        ) -> LoopRow<T> {
+            LoopRow { population, case, variant, flight_time, axis, fact }
+        }
+        let at = |axis: usize| [population, variant, flight_time, axis];
+        for axis in 0..AXES.len() {
+            let of_axis = |loops: &Loops| (loops.axes[axis], loops.unstable);
+            rows.margins.push(row(
+                at(axis),
+                case,
+                loops.as_ref().map(of_axis).map_err(Failure::clone),
+            ));
+            let peaks = loops.iter().flat_map(|loops| &loops.peaks);
+            let of_axis = peaks.filter(|named| named.peak.axis == axis).cloned();
+            rows.peaks.extend(or_none(of_axis).map(|peak| row(at(axis), case, peak)));
+            let curve = loops.iter().flat_map(|loops| &loops.curve);
+            let of_axis = curve.map(|points| points[axis]).enumerate();
+            rows.curves.extend(or_none(of_axis).map(|point| row(at(axis), case, point)));
+        }
+    }
+    rows
+}
+
 /// The rows of a record.
 pub fn rows(definition: &Definition, record: Record) -> (CaseRow, Vec<ModeRow>) {
     let (population, case) = (record.population, record.case);
     let reduced = ReducedCase::new(definition, &record);
+    let loops = loop_metric::values(definition, &record);
     let failure = record.failure().cloned();
     let mut modes = Vec::new();
     for evaluation in record.evaluations {
@@ -68,7 +153,7 @@ pub fn rows(definition: &Definition, record: Record) -> (CaseRow, Vec<ModeRow>) 
         }
     }
     let (values, scores) = (record.values, record.scores);
-    (CaseRow { population, case, values, scores, reduced, failure }, modes)
+    (CaseRow { population, case, values, scores, reduced, loops, failure }, modes)
 }
 
 #[cfg(test)]

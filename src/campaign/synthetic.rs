@@ -42,6 +42,7 @@ pub fn definition(cases: &[u64]) -> Definition {
         gimballed: vec![true, true],
         exchange_ratio: 0.5,
         sensitivity: None,
+        margins: None,
     }
 }
 
@@ -92,7 +93,13 @@ pub fn evaluate(
                 }
                 _ => Ok(poles(definition, variant, case, stored, &mut random)),
             };
-            evaluations.push(Evaluation { variant, flight_time, null_poles: 0, outcome });
+            evaluations.push(Evaluation {
+                variant,
+                flight_time,
+                null_poles: 0,
+                outcome,
+                loops: None,
+            });
         }
     }
     Record {

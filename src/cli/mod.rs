@@ -15,7 +15,9 @@ pub mod import;
 pub mod influence;
 pub mod init;
 pub mod interrupt;
+pub mod margins;
 pub mod merge;
+pub mod model;
 pub mod modes;
 pub mod nominal;
 pub mod outside;
@@ -24,6 +26,7 @@ pub mod plan;
 pub mod planar;
 pub mod progress;
 pub mod replay;
+pub mod response;
 pub mod retry;
 pub mod run;
 pub mod schema;
@@ -39,6 +42,7 @@ pub use error::Error;
 
 use crate::campaign::pool;
 use clap::{Parser, Subcommand};
+use std::borrow::Cow;
 use std::io::{self, ErrorKind, StdoutLock, Write};
 use std::process::ExitCode;
 
@@ -67,6 +71,7 @@ enum Command {
     Check(check::Args),
     Plan(plan::Args),
     Modes(modes::Args),
+    Model(model::Args),
     Import(import::Args),
     Nominal(nominal::Args),
     Run(run::Args),
@@ -82,8 +87,10 @@ enum Command {
     Replay(replay::Args),
     Worst(worst::Args),
     Influence(influence::Args),
+    Response(response::Args),
     HowMany(how_many::Args),
     Planar(planar::Args),
+    Margins(margins::Args),
     Actuator(actuator::Args),
     Schema(schema::Args),
     Completions(completions::Args),
@@ -95,12 +102,25 @@ struct Output(StdoutLock<'static>);
 
 impl Write for Output {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        unless_closed(self.0.write(bytes), bytes.len())
+        let written = match harmless(bytes) {
+            Cow::Borrowed(bytes) => self.0.write(bytes),
+            Cow::Owned(instead) => self.0.write_all(&instead).map(|()| bytes.len()),
+        };
+        unless_closed(written, bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
         unless_closed(self.0.flush(), ())
     }
+}
+
+/// Names and messages come from files of others, too: what would steer a terminal is shown as `?`.
+fn harmless(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let steers = |byte: &u8| byte.is_ascii_control() && !b"\n\t".contains(byte);
+    if !bytes.iter().any(steers) {
+        return Cow::Borrowed(bytes);
+    }
+    bytes.iter().map(|byte| if steers(byte) { b'?' } else { *byte }).collect()
 }
 
 fn unless_closed<T>(result: io::Result<T>, closed: T) -> io::Result<T> {
@@ -131,6 +151,7 @@ pub fn run() -> ExitCode {
         Command::Check(args) => check::run(args, &mut out),
         Command::Plan(args) => plan::run(args, &mut out),
         Command::Modes(args) => modes::run(args, &mut out),
+        Command::Model(args) => model::run(args, &mut out),
         Command::Import(args) => import::run(args, &mut out),
         Command::Nominal(args) => nominal::run(args, &mut out),
         Command::Run(args) => run::run(args, &mut out),
@@ -146,8 +167,10 @@ pub fn run() -> ExitCode {
         Command::Replay(args) => replay::run(args, &mut out),
         Command::Worst(args) => worst::run(args, &mut out),
         Command::Influence(args) => influence::run(args, &mut out),
+        Command::Response(args) => response::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),
+        Command::Margins(args) => margins::run(args, &mut out),
         Command::Actuator(args) => actuator::run(args, &mut out),
         Command::Schema(args) => schema::run(args, &mut out),
         Command::Completions(args) => completions::run(args, &mut out),
@@ -160,4 +183,16 @@ pub fn run() -> ExitCode {
         }
     };
     ExitCode::from(code)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_would_steer_a_terminal_is_shown_instead_of_obeyed() {
+        let text = "a\tb | ζ\n";
+        assert!(matches!(harmless(text.as_bytes()), Cow::Borrowed(_)));
+        assert_eq!(&*harmless(b"red \x1b[31m\r\x07"), b"red ?[31m??");
+    }
 }

@@ -178,8 +178,8 @@ mod tests {
         assert!(drawn.contains("mode m006") && drawn.contains("at 100 s</title>"), "{drawn}");
         let other = run_line(&["modes", "--show", dir, "--time", "7"]).unwrap_err();
         assert!(other.to_string().contains("no modes at 7 s"), "{other}");
-        let other = run_line(&["modes", "--show", dir, "--gimbal", "nose"]).unwrap_err();
-        assert!(other.to_string().contains("no grid `nose`"), "{other}");
+        let other = run_line(&["modes", "--show", dir, "--gimbal", "tail"]).unwrap_err();
+        assert!(other.to_string().contains("no grid `tail`"), "{other}");
         assert!(shown.contains("SLS-like, synthetic") && shown.contains("m006"), "{shown}");
         assert_eq!(run_line(&words).unwrap_err().code(), crate::cli::USAGE);
         run_line(&[&words[..], &["--force"]].concat()).unwrap();

@@ -283,6 +283,7 @@ pub fn replay(
     let definition = Definition {
         populations: vec![population],
         sensitivity: None,
+        margins: None,
         ..outline.definition.clone()
     };
     let sampler = loaded.sampler(&definition)?;

@@ -2,7 +2,7 @@
 
 use crate::vehicle::{
     Ablation, Actuator, Bearing, Engine, Law, MassProperties, Modal, Mode, ModeSet, Motor, Nozzle,
-    Parent, SecondOrder, Vehicle,
+    Parent, SecondOrder, Slosh, Tank, Vehicle,
 };
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 use std::sync::Arc;
@@ -79,6 +79,18 @@ fn modes(flight_time_s: f64, labels: &[(&str, f64)]) -> ModeSet {
     }
 }
 
+fn tank(name: &str) -> Tank {
+    Tank {
+        name: name.into(),
+        grid: format!("tank.{name}"),
+        axes: Matrix3x2::new(0.0, 0.0, 1.0, 0.0, 0.0, 1.0),
+        time_s: vec![0.0],
+        slosh: Slosh::Given { mass_kg: vec![1e5], frequency_hz: vec![0.5] },
+        damping_ratio: 0.01,
+        in_modes: false,
+    }
+}
+
 fn with_modes(sets: Vec<ModeSet>, parents: Vec<Parent>) -> Vehicle {
     Vehicle {
         name: "test".into(),
@@ -90,7 +102,7 @@ fn with_modes(sets: Vec<ModeSet>, parents: Vec<Parent>) -> Vehicle {
             engine("booster", "right", Bearing::Included),
         ],
         autopilot: None,
-        tanks: Vec::new(),
+        tanks: ["lox", "lh2"].map(tank).into(),
         aerodynamics: None,
         modal: Modal {
             source: "test".into(),

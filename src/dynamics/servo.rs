@@ -452,6 +452,31 @@ impl Servo {
         Row { entries, rate: autopilot.sensors[sensor].kind == SensorKind::RateGyro }
     }
 
+    /// What the outputs beside the torques are made of, `feedback.<axis>` where the loop is closed: name,
+    /// factors of the mechanical signals' rows and of the first-order states, and of the external inputs.
+    pub fn feedbacks<'a>(
+        &'a self,
+        composite: &'a StateSpace,
+        drawn: &'a DrawnVehicle,
+        layout: &'a Layout,
+    ) -> impl Iterator<Item = (&'a str, Vec<Row>, Vec<f64>)> {
+        let names = self.connection.outputs().iter().enumerate().skip(self.torques.len());
+        names.map(move |(output, name)| {
+            let mut rows: Vec<Row> = (self.signals.iter().enumerate())
+                .map(|(column, &signal)| {
+                    let mut row = self.row(signal, drawn, layout);
+                    let gain = composite.d[(output, column)];
+                    row.entries.iter_mut().for_each(|(_, factor)| *factor *= gain);
+                    row
+                })
+                .collect();
+            let states = layout.first_order().zip((0..).map(|state| composite.c[(output, state)]));
+            rows.push(Row { entries: states.collect(), rate: false });
+            let external = self.signals.len()..composite.inputs();
+            (name.as_str(), rows, external.map(|input| composite.d[(output, input)]).collect())
+        })
+    }
+
     fn row(&self, signal: Signal, drawn: &DrawnVehicle, layout: &Layout) -> Row {
         let of = |engine, axis, rate| {
             let coordinate = gimbal(layout, (engine, axis));

@@ -77,7 +77,7 @@ struct Cases {
 }
 
 /// Values held at once while a gate is evaluated.
-const HELD: usize = 2 << 20;
+const HELD: usize = 256 << 10;
 
 impl Cases {
     fn of(

@@ -182,7 +182,7 @@ mod tests {
     fn every_table_of_cases_begins_with_population_and_case() {
         let outline =
             crate::campaign::synthetic::outline(&[1, 2], crate::campaign::StoredPoles::Named);
-        for table in TableName::OF_CASES {
+        for table in TableName::of_cases(&outline) {
             let fields = table.fields(&outline);
             assert_eq!(
                 (fields[0].name().as_str(), fields[1].name().as_str()),

@@ -86,6 +86,15 @@ pub struct Table {
     columns: Vec<Values>,
 }
 
+/// A text as a cell of comma-separated values.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
 impl Table {
     /// An empty table of this layout.
     pub fn new(layout: &Layout) -> Self {
@@ -130,6 +139,23 @@ impl Table {
             Values::Text(values) => values.iter(),
             Values::Number(_) => unreachable!("the layout says what a column holds"),
         }
+    }
+
+    /// The table as comma-separated values with a header; numbers in as many digits as bring them back.
+    pub fn to_csv(&self, layout: &Layout) -> String {
+        let names: Vec<&str> = layout.columns.iter().map(|Column(name, ..)| *name).collect();
+        let mut csv = names.join(",") + "\n";
+        let texts = self.columns.iter().map(|column| match column {
+            Values::Number(values) => values.iter().map(|x| format!("{x:?}")).collect(),
+            Values::Text(values) => values.iter().map(quoted).collect(),
+        });
+        let columns: Vec<Vec<String>> = texts.collect();
+        for row in 0..self.rows() {
+            let cells: Vec<&str> = columns.iter().map(|column| column[row].as_str()).collect();
+            csv += &cells.join(",");
+            csv.push('\n');
+        }
+        csv
     }
 
     /// The bytes of the Parquet file: snappy, dictionaries for texts alone, one row group, no time

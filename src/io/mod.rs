@@ -1,7 +1,9 @@
 //! Input and output: the only module that touches the disk.
 
+pub mod actuator;
 mod assemble;
 pub mod column;
+mod envelope;
 mod fault;
 pub mod files;
 pub mod flat;
@@ -12,9 +14,11 @@ pub mod listed;
 pub mod lock;
 pub mod maker;
 pub mod manifest;
+pub mod model;
 pub mod package;
 pub mod plan;
 pub mod replay;
+pub mod response;
 pub mod results;
 pub mod run;
 pub mod scaffold;

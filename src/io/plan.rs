@@ -42,6 +42,7 @@ pub fn write(path: &Path, outline: &Outline, sampler: &Sampler<'_>) -> Result<u6
                 reduced: ReducedCase::new(&outline.definition, &record),
                 values: record.values,
                 scores: record.scores,
+                loops: Vec::new(),
                 failure: None,
             });
             if (case + 1) % schema::TableName::Cases.group_cases(outline) == 0 {

@@ -16,7 +16,7 @@ use super::schema::{self, TableName};
 use super::shard::Filling;
 use super::store::{Access, NEXT, Store, TABLES};
 use super::table::{self, Content, Table};
-use super::{assemble, summarise};
+use super::{assemble, envelope, summarise};
 use crate::campaign::metric::LONGEST_NAME;
 use crate::campaign::summary::{SummaryRow, WorstRow};
 use crate::campaign::{Outline, Record};
@@ -88,7 +88,10 @@ impl Results {
         let mut store = match opening {
             Opening::New => Store::begin(folder, outline, inputs, access)?,
             Opening::Resume { cases } => Store::resume(folder, outline, cases, inputs, access)?,
-            Opening::Extend(_) => Store::resume(folder, outline, false, None, access)?,
+            Opening::Extend(_) => {
+                Store::refuse_none(folder)?;
+                Store::resume(folder, outline, false, None, access)?
+            }
         };
         if let Opening::Extend(more) = opening {
             store.extend(more)?;
@@ -159,7 +162,7 @@ impl Results {
         let next = store.folder().join(NEXT);
         files::ensure_folder(&next.join(TABLES))?;
         let mut contents = BTreeMap::new();
-        for table in TableName::OF_CASES {
+        for table in TableName::of_cases(store.outline()) {
             contents.insert(table, assemble::assemble(store, table, &next)?);
         }
         let mut run = Run::of(&next, store.outline().clone(), contents);
@@ -174,6 +177,17 @@ impl Results {
             write.table(TableName::Columns, schema::columns(), &described)?,
         ];
         for (name, content) in made {
+            run.insert(name, content);
+        }
+        if TableName::of_run(run.outline()).contains(&TableName::Envelopes) {
+            let rows = envelope::envelopes(&run, summarise::MEMORY)?;
+            let columns = schema::envelopes(run.outline());
+            let (name, content) =
+                Writing { folder: store.folder(), next: &next, outline: run.outline() }.table(
+                    TableName::Envelopes,
+                    columns,
+                    &rows,
+                )?;
             run.insert(name, content);
         }
         let tables = run.contents().map(|(name, c)| (name.name().to_owned(), c.clone())).collect();
@@ -264,7 +278,8 @@ mod tests {
 
     fn tables(folder: &Path) -> Vec<(&'static str, Vec<u8>)> {
         let read = |table: TableName| (table.name(), fs::read(folder.join(table.file())).unwrap());
-        TableName::ALL.map(read).into()
+        let outline = cases::outline(&[1], StoredPoles::Named);
+        TableName::of_run(&outline).into_iter().map(read).collect()
     }
 
     #[test]
@@ -338,7 +353,7 @@ mod tests {
         let run = folder.path().join("run");
         synthetic::run(&run, cases::outline(&CASES, StoredPoles::All), 2).unwrap();
         let mut nulls = 0;
-        for table in TableName::ALL {
+        for table in TableName::of_run(&cases::outline(&[1], StoredPoles::Named)) {
             let reader = Reader::try_new(File::open(run.join(table.file())).unwrap()).unwrap();
             for batch in reader.build().unwrap() {
                 for column in batch.unwrap().columns() {
@@ -361,7 +376,7 @@ mod tests {
         let outline = cases::outline(&[1], StoredPoles::Named);
         let described = schema::dictionary(&outline);
         synthetic::run(&run, outline, 1).unwrap();
-        for table in TableName::ALL {
+        for table in TableName::of_run(&cases::outline(&[1], StoredPoles::Named)) {
             let reader = Reader::try_new(File::open(run.join(table.file())).unwrap()).unwrap();
             let of_table: Vec<_> = described.iter().filter(|d| d.table == table).collect();
             assert_eq!(reader.schema().fields().len(), of_table.len());

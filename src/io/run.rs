@@ -60,7 +60,7 @@ impl Run {
         let name = files::name(&folder.join(super::manifest::FILE));
         let mut problems = Problems::default();
         let mut contents = BTreeMap::new();
-        for table in TableName::ALL {
+        for table in TableName::of_run(&manifest.run) {
             let Some(content) = manifest.tables.get(table.name()) else {
                 let key = format!("tables.{}", table.name());
                 problems.push(Kind::Damage, &name, key, "nothing", "rows, bytes and digest");
@@ -87,7 +87,7 @@ impl Run {
         }
         let run = problems.into_result(Self::of(folder, manifest.run, contents))?;
         let mut problems = Problems::default();
-        for table in TableName::ALL {
+        for table in TableName::of_run(&run.outline) {
             if let Err(found) = run.checked(table) {
                 problems.extend(found);
             }
@@ -305,7 +305,7 @@ impl Run {
             return Err(self.damage(table, format!("{found} rows"), format!("{rows} rows")));
         }
         let groups = match table {
-            _ if TableName::OF_CASES.contains(&table) => {
+            _ if TableName::of_cases(&self.outline).contains(&table) => {
                 self.groups(table, &self.outline.definition.populations)
             }
             _ => u64::from(rows > 0),

@@ -5,16 +5,20 @@
 
 use super::column::Column;
 use crate::campaign::Population;
+use crate::campaign::loop_metric::loop_metrics;
 use crate::campaign::metric::metrics;
 use crate::campaign::nested::Statement;
 use crate::campaign::Sensitivity;
 use crate::campaign::outline::{Outline, StoredPoles};
 use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
-use crate::campaign::row::{CaseRow, ModeRow};
+use crate::campaign::row::{CaseRow, CurveRow, LoopRow, MarginRow, ModeRow, PeakRow};
 use crate::campaign::sample::Intervals;
 use crate::campaign::summary::{LEVELS, Spread, SummaryRow, WorstRow};
 use crate::dynamics::Part;
+use crate::margins::envelope::{self, EnvelopeRow};
+use crate::margins::{AXES, AxisMargins, Margin, Peak, Stabilised};
 use arrow::datatypes::Field;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Version of the tables' columns and metadata; a change of either raises it.
@@ -30,6 +34,9 @@ const GROUP_ROWS: u64 = 128 << 10;
 /// Poles of an evaluation reckoned with where all are stored.
 const ALL_POLES: u64 = 128;
 
+/// Resonances reckoned with in a loop.
+const RESONANCES: u64 = 16;
+
 /// A results table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum TableName {
@@ -43,15 +50,51 @@ pub enum TableName {
     Worst,
     /// The data dictionary.
     Columns,
+    /// One row per assessed evaluation and axis; this and the tables below only where a run asks for
+    /// margins.
+    Margins,
+    /// One row per assessed evaluation, axis and resonance.
+    LoopModes,
+    /// One row per assessed evaluation, axis and frequency of the envelopes.
+    LoopCurves,
+    /// One row per population, assessed variant, flight time, axis and frequency.
+    Envelopes,
 }
 
 impl TableName {
     /// Every table, in the order of writing.
-    pub const ALL: [Self; 5] =
-        [Self::Cases, Self::Modes, Self::Summary, Self::Worst, Self::Columns];
+    pub const ALL: [Self; 9] = [
+        Self::Cases,
+        Self::Modes,
+        Self::Summary,
+        Self::Worst,
+        Self::Columns,
+        Self::Margins,
+        Self::LoopModes,
+        Self::LoopCurves,
+        Self::Envelopes,
+    ];
 
-    /// The tables that follow the cases, case by case; the others are made from them.
-    pub const OF_CASES: [Self; 2] = [Self::Cases, Self::Modes];
+    /// The tables of a run.
+    pub fn of_run(outline: &Outline) -> Vec<Self> {
+        let margins = outline.definition.margins.as_ref();
+        let held = |table: &Self| match table {
+            Self::Margins | Self::LoopModes => margins.is_some(),
+            Self::LoopCurves | Self::Envelopes => {
+                margins.is_some_and(|plan| !plan.envelope_hz.is_empty())
+            }
+            _ => true,
+        };
+        Self::ALL.into_iter().filter(held).collect()
+    }
+
+    /// The tables of a run that follow its cases, case by case; the others are made from them.
+    pub fn of_cases(outline: &Outline) -> Vec<Self> {
+        let held = |table: &Self| {
+            !matches!(table, Self::Summary | Self::Worst | Self::Columns | Self::Envelopes)
+        };
+        Self::of_run(outline).into_iter().filter(held).collect()
+    }
 
     /// The word in file names.
     pub fn name(self) -> &'static str {
@@ -61,6 +104,10 @@ impl TableName {
             Self::Summary => "summary",
             Self::Worst => "worst",
             Self::Columns => "columns",
+            Self::Margins => "margins",
+            Self::LoopModes => "loop_modes",
+            Self::LoopCurves => "loop_curves",
+            Self::Envelopes => "envelopes",
         }
     }
 
@@ -80,6 +127,10 @@ impl TableName {
             Self::Summary => fields(&summary(outline)),
             Self::Worst => fields(&worst(outline)),
             Self::Columns => fields(&columns()),
+            Self::Margins => fields(&margins(outline)),
+            Self::LoopModes => fields(&loop_modes(outline)),
+            Self::LoopCurves => fields(&loop_curves(outline)),
+            Self::Envelopes => fields(&envelopes(outline)),
         }
     }
 
@@ -87,18 +138,33 @@ impl TableName {
     /// boundaries of all tables and of shards coincide. Fixed by the outline.
     pub fn group_cases(self, outline: &Outline) -> u64 {
         let definition = &outline.definition;
-        if self != Self::Modes {
-            let columns = (metrics(definition).len() + 2 * outline.draws.len() + 4) as u64;
-            return 1 << (GROUP_CELLS / columns).clamp(1, MOST_GROUP_CASES).ilog2();
-        }
-        let poles = match outline.poles {
-            StoredPoles::Named => definition.modes.len() as u64,
-            StoredPoles::All => ALL_POLES,
+        let (variants, times) = (definition.variants.len(), definition.flight_times_s.len());
+        let plan = definition.margins.as_ref();
+        let axes = plan.map_or(0, |plan| plan.variants.len()) * AXES.len();
+        let rows = match self {
+            Self::Modes => {
+                let poles = match outline.poles {
+                    StoredPoles::Named => definition.modes.len() as u64,
+                    StoredPoles::All => ALL_POLES,
+                };
+                // With derivatives a row is as long as many.
+                let rule = definition.sensitivity.as_ref();
+                let long = rule.map_or(0, |_| outline.draws.len() as u64 / 8);
+                (variants * times) as u64 * poles * (1 + long)
+            }
+            Self::Margins => (axes * times) as u64,
+            Self::LoopModes => (axes * times) as u64 * RESONANCES,
+            Self::LoopCurves => {
+                (axes * times * plan.map_or(0, |plan| plan.envelope_hz.len())) as u64
+            }
+            _ => {
+                let loops = loop_metrics(definition).len();
+                let metrics = metrics(definition).len() + loops;
+                let columns = (metrics + 2 * outline.draws.len() + 4) as u64;
+                return 1 << (GROUP_CELLS / columns).clamp(1, MOST_GROUP_CASES).ilog2();
+            }
         };
-        let evaluations = definition.variants.len() * definition.flight_times_s.len();
-        // With derivatives a row is as long as many.
-        let long = outline.definition.sensitivity.as_ref().map_or(0, |_| outline.draws.len() / 8);
-        let rows = (evaluations as u64 * poles * (1 + long as u64)).max(1);
+        let rows = rows.max(1);
         let cases = (GROUP_ROWS / rows).clamp(1, MOST_GROUP_CASES);
         1 << cases.ilog2()
     }
@@ -189,6 +255,12 @@ pub fn cases(outline: &Outline) -> Vec<Column<CaseRow>> {
             r.failure.as_ref().map(|f| f.message.as_str())
         }),
     ]);
+    for (index, metric) in loop_metrics(&outline.definition).into_iter().enumerate() {
+        let description = format!("{}; NULL if an evaluation failed", metric.description);
+        columns.push(Column::number(metric.name, metric.unit, description, move |r: &CaseRow| {
+            r.loops.get(index).copied().flatten()
+        }));
+    }
     for metric in metrics(&outline.definition) {
         let (name, unit, description) = (metric.name.clone(), metric.unit, &metric.description);
         let description = format!("{description}; NULL if an evaluation failed");
@@ -591,6 +663,212 @@ pub fn worst(outline: &Outline) -> Vec<Column<WorstRow>> {
     ]
 }
 
+/// The columns with which every table of loops begins.
+fn loop_identity<T: 'static>(outline: &Outline) -> Vec<Column<LoopRow<T>>> {
+    let times = outline.definition.flight_times_s.clone();
+    vec![
+        population(outline, |r: &LoopRow<T>| r.population),
+        Column::count("case", "Case index inside the population", |r: &LoopRow<T>| {
+            Some(r.case as i64)
+        }),
+        variant(outline, |r: &LoopRow<T>| r.variant),
+        Column::number("flight_time_s", "s", "Flight time", move |r: &LoopRow<T>| {
+            times.get(r.flight_time).copied()
+        }),
+        axis(|r: &LoopRow<T>| r.axis),
+    ]
+}
+
+fn axis<R>(get: impl Fn(&R) -> usize + Send + 'static) -> Column<R> {
+    let description = "Axis at whose command the loop is broken, the others closed";
+    Column::word("axis", description, AXES, move |r| Some(get(r)))
+}
+
+/// Columns of the `margins` table.
+pub fn margins(outline: &Outline) -> Vec<Column<MarginRow>> {
+    type Pick = fn(&AxisMargins) -> Margin;
+    let picks: [(&str, &str, &str, &str, Pick); 6] = [
+        (
+            "gain_margin_low",
+            "_db",
+            "dB",
+            "Low gain margin: loss of gain to instability, at most 40",
+            |m| m.gain_low_db,
+        ),
+        (
+            "gain_margin_high",
+            "_db",
+            "dB",
+            "High gain margin: gain to instability, at most 40",
+            |m| m.gain_high_db,
+        ),
+        ("phase_margin", "_deg", "deg", "Phase margin in either direction, at most 180", |m| {
+            m.phase_deg
+        }),
+        (
+            "delay_margin",
+            "_s",
+            "s",
+            "Delay margin: additional delay to instability, at most 10",
+            |m| m.delay_s,
+        ),
+        ("disk_margin", "", "1", "Disk margin α = 2/max|S − T| (skew 0), at most 2", |m| m.disk),
+        (
+            "ellipse_distance",
+            "",
+            "1",
+            "Distance from the Nichols ellipse of the run's gain and phase margin, 1 touches it, at \
+             most 10",
+            |m| m.ellipse,
+        ),
+    ];
+    let mut columns = loop_identity(outline);
+    columns.push(Column::count(
+        "unstable_poles",
+        "Closed-loop poles in the right half plane by Nyquist's count; all margins are 0 where \
+         there are any; NULL if failed",
+        |r: &MarginRow| r.fact.as_ref().ok().map(|(_, unstable)| *unstable),
+    ));
+    for (stem, suffix, unit, description, pick) in picks {
+        columns.push(Column::number(
+            format!("{stem}{suffix}"),
+            unit,
+            format!("{description}; NULL if failed"),
+            move |r: &MarginRow| r.fact.as_ref().ok().map(|(axis, _)| pick(axis).value),
+        ));
+        columns.push(Column::number(
+            format!("{stem}_frequency_hz"),
+            "Hz",
+            "Frequency where it is tightest, 0 for the limit of low frequency; NULL if nothing crosses",
+            move |r: &MarginRow| {
+                let (axis, _) = r.fact.as_ref().ok()?;
+                pick(axis).omega_rad_s.map(|omega| omega / TAU)
+            },
+        ));
+    }
+    columns.extend([
+        Column::word("status", "ok, or the kind of failure", statuses(), |r: &MarginRow| {
+            Some(status(r.fact.as_ref().err()))
+        }),
+        Column::text("failure_message", "What the failure says", |r: &MarginRow| {
+            r.fact.as_ref().err().map(|f| f.message.as_str())
+        }),
+    ]);
+    columns
+}
+
+/// Words of the `stabilised` column.
+const STABILISED: [Stabilised; 3] = [Stabilised::Gain, Stabilised::Phase, Stabilised::Neither];
+
+/// Columns of the `loop_modes` table.
+pub fn loop_modes(outline: &Outline) -> Vec<Column<PeakRow>> {
+    let number = |name: &str, unit: &str, description: &str, get: fn(&Peak) -> f64| {
+        Column::number(name, unit, description, move |r: &PeakRow| {
+            r.fact.as_ref().map(|named| get(&named.peak))
+        })
+    };
+    let mut columns = loop_identity(outline);
+    columns.extend([
+        Column::text(
+            "motion",
+            "Modal label, rigid motion (axial, roll, pitch, yaw), nozzle, tank or servo with the largest \
+             participation in the pole; NULL, as all that follows, for an axis without a resonance \
+             above -60 dB or a failed evaluation",
+            |r: &PeakRow| r.fact.as_ref().map(|named| named.motion.as_str()),
+        ),
+        number("pole_re_rad_s", "rad/s", "Real part of the pole, loops open", |p| p.pole.re),
+        number("pole_im_rad_s", "rad/s", "Imaginary part of the pole, loops open", |p| p.pole.im),
+        number("peak_db", "dB", "Largest magnitude of the loop near the resonance", |p| p.peak_db),
+        number("peak_frequency_hz", "Hz", "Its frequency", |p| p.omega_rad_s / TAU),
+        number("from_critical_deg", "deg", "Angle of the loop from -180 degrees there", |p| {
+            p.from_critical_deg
+        }),
+        Column::word(
+            "stabilised",
+            "gain: the peak is below minus the gain margin; phase: the closed loop is stable, and about the \
+             peak the loop is at least the phase margin away from -180 degrees wherever it is within the \
+             gain margin of 0 dB; neither",
+            STABILISED.map(Stabilised::name),
+            |r: &PeakRow| {
+                let how = r.fact.as_ref()?.peak.stabilised;
+                STABILISED.iter().position(|other| *other == how)
+            },
+        ),
+    ]);
+    columns
+}
+
+/// Columns of the `loop_curves` table.
+pub fn loop_curves(outline: &Outline) -> Vec<Column<CurveRow>> {
+    let plan = outline.definition.margins.iter();
+    let grid: Vec<f64> = plan.flat_map(|plan| plan.envelope_hz.clone()).collect();
+    let mut columns = loop_identity(outline);
+    columns.extend([
+        Column::number("frequency_hz", "Hz", "Frequency; NULL if failed", move |r: &CurveRow| {
+            r.fact.and_then(|(index, _)| grid.get(index).copied())
+        }),
+        Column::number(
+            "magnitude_db",
+            "dB",
+            "Magnitude; NULL for a loop of nothing",
+            |r: &CurveRow| r.fact.map(|(_, point)| point.magnitude_db),
+        ),
+        Column::number(
+            "phase_deg",
+            "deg",
+            "Phase, unwrapped from low frequency",
+            |r: &CurveRow| r.fact.map(|(_, point)| point.phase_deg),
+        ),
+    ]);
+    columns
+}
+
+/// Columns of the `envelopes` table.
+pub fn envelopes(outline: &Outline) -> Vec<Column<EnvelopeRow>> {
+    let times = outline.definition.flight_times_s.clone();
+    let mut columns = vec![
+        population(outline, |r: &EnvelopeRow| r.population),
+        variant(outline, |r: &EnvelopeRow| r.variant),
+        Column::number("flight_time_s", "s", "Flight time", move |r: &EnvelopeRow| {
+            times.get(r.flight_time).copied()
+        }),
+        axis(|r: &EnvelopeRow| r.axis),
+        Column::number("frequency_hz", "Hz", "Frequency", |r: &EnvelopeRow| Some(r.frequency_hz)),
+        Column::count("cases", "Cases with a curve", |r: &EnvelopeRow| Some(r.cases as i64)),
+    ];
+    type Quantity = fn(&EnvelopeRow) -> Option<&envelope::Spread>;
+    let quantities: [(&str, &str, &str, &str, Quantity); 2] = [
+        ("magnitude", "_db", "dB", "magnitude", |r| r.magnitude_db.as_ref()),
+        ("phase", "_deg", "deg", "phase, brought within half a turn of the nominal case's", |r| {
+            r.phase_deg.as_ref()
+        }),
+    ];
+    for (stem, suffix, unit, what, of) in quantities {
+        let mut push = |name: &str,
+                        description: String,
+                        pick: Box<dyn Fn(&envelope::Spread) -> f64 + Send>| {
+            columns.push(Column::number(
+                format!("{stem}_{name}{suffix}"),
+                unit,
+                description,
+                move |r| of(r).map(&pick),
+            ));
+        };
+        push("min", format!("Least {what}"), Box::new(|s| s.smallest));
+        for (index, level) in envelope::LEVELS.into_iter().enumerate() {
+            let description =
+                format!("Quantile at {level} of the {what} (linear between order statistics)");
+            push(
+                &format!("p{:02.0}", 100.0 * level),
+                description,
+                Box::new(move |s| s.quantiles[index]),
+            );
+        }
+        push("max", format!("Greatest {what}"), Box::new(|s| s.largest));
+    }
+    columns
+}
+
 /// One row of the data dictionary.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Described {
@@ -638,5 +916,14 @@ pub fn dictionary(outline: &Outline) -> Vec<Described> {
     all.extend(describe(TableName::Summary, &summary(outline)));
     all.extend(describe(TableName::Worst, &worst(outline)));
     all.extend(describe(TableName::Columns, &columns()));
+    let tables = TableName::of_run(outline);
+    if tables.contains(&TableName::Margins) {
+        all.extend(describe(TableName::Margins, &margins(outline)));
+        all.extend(describe(TableName::LoopModes, &loop_modes(outline)));
+    }
+    if tables.contains(&TableName::LoopCurves) {
+        all.extend(describe(TableName::LoopCurves, &loop_curves(outline)));
+        all.extend(describe(TableName::Envelopes, &envelopes(outline)));
+    }
     all
 }

@@ -10,7 +10,7 @@ use super::maker::Maker;
 use super::run::decoded;
 use super::schema::{self, TableName};
 use super::table::{self, Content, Table};
-use crate::campaign::row::{self, CaseRow, ModeRow};
+use crate::campaign::row::{self, CaseRow, CurveRow, LoopRows, MarginRow, ModeRow, PeakRow};
 use crate::campaign::{Outline, Record};
 use crate::problem::Problems;
 use arrow::record_batch::RecordBatch;
@@ -32,6 +32,9 @@ const LARGEST: u64 = 2 << 30;
 const MOST_ROWS: u64 = 64 << 10;
 /// Cells of the `cases` table after which a shard ends.
 const MOST_CELLS: u64 = 1 << 20;
+/// Cases after which a shard ends: soon enough that a long campaign takes no more memory than a
+/// short one.
+const MOST_CASES: u64 = 8192;
 
 /// What a shard holds, in its first line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -74,6 +77,43 @@ pub struct Filling {
     most_cases: u64,
     rows: Table<CaseRow, Vec<u8>>,
     modes: Table<ModeRow, Vec<u8>>,
+    loops: Option<LoopTables>,
+}
+
+/// A finished table of a shard: its bytes and what they hold.
+type Part = (TableName, (Vec<u8>, Content));
+
+/// The tables of loops of a shard being filled.
+struct LoopTables {
+    margins: Table<MarginRow, Vec<u8>>,
+    peaks: Table<PeakRow, Vec<u8>>,
+    curves: Option<Table<CurveRow, Vec<u8>>>,
+}
+
+impl LoopTables {
+    fn push(&mut self, rows: &LoopRows) {
+        rows.margins.iter().for_each(|row| self.margins.push(row));
+        rows.peaks.iter().for_each(|row| self.peaks.push(row));
+        if let Some(curves) = &mut self.curves {
+            rows.curves.iter().for_each(|row| curves.push(row));
+        }
+    }
+
+    fn gathered(&self) -> u64 {
+        let curves = self.curves.as_ref().map_or(0, Table::gathered);
+        self.margins.gathered().max(self.peaks.gathered()).max(curves)
+    }
+
+    fn close(self) -> Result<Vec<Part>, ParquetError> {
+        let mut parts = vec![
+            (TableName::Margins, self.margins.close()?),
+            (TableName::LoopModes, self.peaks.close()?),
+        ];
+        if let Some(curves) = self.curves {
+            parts.push((TableName::LoopCurves, curves.close()?));
+        }
+        Ok(parts)
+    }
 }
 
 impl Filling {
@@ -86,7 +126,8 @@ impl Filling {
             Table::new(columns, &[], Vec::new())
         }
         let rows = schema::cases(outline);
-        let most_cases = (MOST_CELLS / rows.len() as u64).max(1);
+        let tables = TableName::of_cases(outline);
+        let most_cases = (MOST_CELLS / rows.len() as u64).clamp(1, MOST_CASES);
         Ok(Self {
             population,
             cases: first..first,
@@ -95,6 +136,17 @@ impl Filling {
             most_cases,
             rows: open(rows)?,
             modes: open(schema::modes(outline))?,
+            loops: match tables.contains(&TableName::Margins) {
+                false => None,
+                true => Some(LoopTables {
+                    margins: open(schema::margins(outline))?,
+                    peaks: open(schema::loop_modes(outline))?,
+                    curves: match tables.contains(&TableName::LoopCurves) {
+                        false => None,
+                        true => Some(open(schema::loop_curves(outline))?),
+                    },
+                }),
+            },
         })
     }
 
@@ -108,10 +160,15 @@ impl Filling {
         self.failed += u64::from(record.failure().is_some());
         self.unstable += u64::from(record.unstable());
         self.cases.end = record.case + 1;
+        let mut gathered = 0;
+        if let Some(loops) = &mut self.loops {
+            loops.push(&row::loop_rows(&record));
+            gathered = loops.gathered();
+        }
         let (case, modes) = row::rows(&outline.definition, record);
         self.rows.push(&case);
         modes.iter().for_each(|mode| self.modes.push(mode));
-        let rows = self.rows.gathered().max(self.modes.gathered());
+        let rows = self.rows.gathered().max(self.modes.gathered()).max(gathered);
         rows >= MOST_ROWS || self.rows.gathered() >= self.most_cases
     }
 
@@ -123,13 +180,14 @@ impl Filling {
         let population = &outline.definition.populations[self.population].name;
         let path = run.join(file(population, &self.cases));
         let failed = |error: ParquetError| table::problem(&path, &error);
-        let parts = [
+        let mut parts = vec![
             (TableName::Cases, self.rows.close().map_err(failed)?),
             (TableName::Modes, self.modes.close().map_err(failed)?),
         ];
-        let of = |(name, (_, content)): &(TableName, (Vec<u8>, Content))| {
-            (name.name().to_owned(), content.clone())
-        };
+        if let Some(loops) = self.loops {
+            parts.extend(loops.close().map_err(failed)?);
+        }
+        let of = |(name, (_, content)): &Part| (name.name().to_owned(), content.clone());
         let header = Header {
             schema_version: schema::VERSION,
             run: identity.to_owned(),
@@ -143,6 +201,7 @@ impl Filling {
         let text = serde_json::to_string(&header).expect("a header has text keys only");
         let first = format!("{MAGIC}{} {text}\n", files::digest_of(text.as_bytes()));
         let mut aside = Aside::within(run, &path)?;
+        files::ensure_folder(&run.join(FOLDER))?;
         let mut bytes = vec![first.as_bytes()];
         bytes.extend(parts.iter().map(|(_, (bytes, _))| bytes.as_slice()));
         for bytes in bytes {
@@ -217,7 +276,9 @@ impl Shard {
             return Err(damage(found, "cases of the run"));
         };
         let names: Vec<&str> = header.tables.iter().map(|(name, _)| name.as_str()).collect();
-        if names != TableName::OF_CASES.map(TableName::name) {
+        if names
+            != TableName::of_cases(outline).into_iter().map(TableName::name).collect::<Vec<_>>()
+        {
             return Err(damage(format!("the tables {}", names.join(", ")), "those of a shard"));
         }
         let sizes = header.tables.iter().map(|(_, content)| content.bytes);
@@ -235,7 +296,8 @@ impl Shard {
     /// # Errors
     /// Damage, with the name of the shard.
     pub fn verify(&self) -> Result<(), Problems> {
-        TableName::OF_CASES.into_iter().try_for_each(|table| self.bytes(table.name()).map(|_| ()))
+        let names = self.header.tables.iter().map(|(name, _)| name);
+        names.into_iter().try_for_each(|table| self.bytes(table).map(|_| ()))
     }
 
     /// What a table holds and its bytes, held against their digest.

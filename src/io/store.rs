@@ -129,7 +129,6 @@ impl Store {
         access: Access,
         locks: Vec<Lock>,
     ) -> Result<Self, Problems> {
-        files::ensure_folder(&folder.join(shard::FOLDER))?;
         let identity = outline.identity();
         let stale = locks.iter().filter_map(|lock| lock.stale.as_ref());
         let mended = stale.map(|by| format!("took over the stale lock of {}", by.name())).collect();
@@ -173,6 +172,17 @@ impl Store {
         store.with_shards(true)
     }
 
+    /// Refuses a folder that holds no run.
+    ///
+    /// # Errors
+    /// An input problem that says so.
+    pub fn refuse_none(folder: &Path) -> Result<(), Problems> {
+        match look(folder)? {
+            Found::Nothing => Err(no_run(folder)),
+            _ => Ok(()),
+        }
+    }
+
     /// Opens a run as it is, without its shards.
     fn open(folder: &Path, access: Access) -> Result<Self, Problems> {
         let locks = locked(folder, access)?;
@@ -181,11 +191,7 @@ impl Store {
             files::sweep(folder);
         }
         let (outline, maker, tables, extended) = match look(folder)? {
-            Found::Nothing => {
-                let found = "neither a finished run nor one under way";
-                let name = files::name(folder);
-                return Err(Problems::input(name, "", found, "the folder of a run"));
-            }
+            Found::Nothing => return Err(no_run(folder)),
             Found::Finished(manifest) => {
                 let maker = manifest.execution.maker.clone();
                 (manifest.run, maker, Some(Run::open(folder)?), false)
@@ -294,6 +300,8 @@ impl Store {
                     files::rename(&path, &path.with_extension("damaged"))?;
                     self.mended.push(format!("{found}; its cases are evaluated again"));
                 }
+                // Perhaps another part's: evaluated again if it is needed, and left to the merge.
+                Err(found) if mend => self.mended.push(format!("{found}; left as it is")),
                 Err(found) => problems.extend(found),
             }
         }
@@ -431,8 +439,11 @@ impl Drop for Store {
     fn drop(&mut self) {
         // A run of which nothing is evaluated leaves nothing behind.
         if self.access == Access::Whole {
-            files::remove_folder(&self.folder.join(NEXT).join(TABLES));
-            files::remove_folder(&self.folder.join(NEXT));
+            // What is made whole may be half in its place: the next process goes on with that.
+            if !self.folder.join(NEXT).join(manifest::FILE).is_file() {
+                files::remove_folder(&self.folder.join(NEXT));
+            }
+            files::remove_if_empty(&self.folder.join(shard::FOLDER));
             let none = files::names(&self.folder.join(shard::FOLDER)).is_ok_and(|n| n.is_empty());
             if self.tables.is_none() && self.shards.is_empty() && none {
                 remove_unstarted(&self.folder);
@@ -534,6 +545,11 @@ fn settle(folder: &Path) -> Result<(), Problems> {
     Ok(())
 }
 
+fn no_run(folder: &Path) -> Problems {
+    let found = "neither a finished run nor one under way";
+    Problems::input(files::name(folder), "", found, "the folder of a run")
+}
+
 /// What a folder holds of a run.
 fn look(folder: &Path) -> Result<Found, Problems> {
     let path = folder.join(STARTED);
@@ -618,10 +634,7 @@ impl Status {
 /// Input: no folder of a run. Damage: what says what it is cannot be read.
 pub fn status(folder: &Path) -> Result<Status, Problems> {
     let (finished, outline) = match look(folder)? {
-        Found::Nothing => {
-            let found = "neither a finished run nor one under way";
-            return Err(Problems::input(files::name(folder), "", found, "the folder of a run"));
-        }
+        Found::Nothing => return Err(no_run(folder)),
         Found::Finished(manifest) => (true, manifest.run),
         Found::Started(started) => (false, started.run),
     };

@@ -14,7 +14,7 @@ use crate::problem::Problems;
 use crate::stats;
 
 /// Memory for values held at once, bytes.
-pub const MEMORY: usize = 16 << 20;
+pub const MEMORY: usize = 2 << 20;
 
 /// Every row of the summary, in order; the values held at once take about `memory` bytes.
 ///

@@ -1,16 +1,19 @@
 //! The eigen-solver: poles of a model by a dense solve, eigenvectors by inverse iteration.
 //!
-//! The only file that names faer's solvers. Mass matrix by Cholesky, Parlett–Reinsch balancing,
+//! With `response` the only file that names faer's solvers. Mass matrix by Cholesky, Parlett–Reinsch balancing,
 //! Hessenberg QR, all sequential and in buffers that are reused; what poles mean is decided in
 //! `identify`.
 
 use crate::dynamics::Model;
+use crate::dynamics::servo::Row;
+use crate::vehicle::StateSpace;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt;
 use faer::linalg::evd::{self, ComputeEigenvectors, EvdParams};
 use faer::linalg::lu::partial_pivoting as lu;
 use faer::{Conj, Mat, MatMut, MatRef, Par, Spec, c64};
 use nalgebra::DMatrix;
+use std::ops::Range;
 
 /// Why a solve failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -194,6 +197,51 @@ impl Solver {
     pub fn state_matrix(&mut self, model: &Model) -> Result<&DMatrix<f64>, Error> {
         self.build_state(model)?;
         Ok(&self.state)
+    }
+
+    /// The state space of the model driven by `E w` on its right-hand side (`inputs` is E, coordinates ×
+    /// inputs) with the outputs `rows`, linear in coordinates or rates. The rigid rotation is kept, null or not, as
+    /// outputs may read it; the translation is left out where it is null.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn state_space(
+        &mut self,
+        model: &Model,
+        translation: Range<usize>,
+        inputs: &DMatrix<f64>,
+        rows: &[Row],
+    ) -> Result<StateSpace, Error> {
+        let n = model.second_order;
+        let mut observed = model.clone();
+        observed.null_motion = None;
+        observed.null_states.retain(|state| {
+            translation.contains(state) || translation.contains(&state.wrapping_sub(n))
+        });
+        self.build_state(&observed)?;
+        let mut accelerations = Mat::from_fn(n, inputs.ncols(), |i, j| inputs[(i, j)]);
+        llt::solve::solve_in_place(
+            self.factor.as_ref().submatrix(0, 0, n, n),
+            accelerations.as_mut(),
+            Par::Seq,
+            MemStack::new(&mut self.memory),
+        );
+        let b =
+            DMatrix::from_fn(self.kept.len(), inputs.ncols(), |row, input| match self.kept[row] {
+                state if state < n => 0.0,
+                state if state < 2 * n => accelerations[(state - n, input)],
+                state => inputs[(state - n, input)],
+            });
+        let mut c = DMatrix::zeros(rows.len(), self.kept.len());
+        for (output, row) in rows.iter().enumerate() {
+            for &(coordinate, factor) in &row.entries {
+                let state = coordinate + if row.rate { n } else { 0 };
+                let kept = self.kept.binary_search(&state);
+                c[(output, kept.expect("outputs read no translation"))] += factor;
+            }
+        }
+        let d = DMatrix::zeros(rows.len(), inputs.ncols());
+        Ok(StateSpace { a: self.state.clone(), b, c, d })
     }
 
     /// `A = [[0, 1, 0], [−M⁻¹K, −M⁻¹D, −M⁻¹K_qa], [−K_aq, −D_aq, −K_aa]]` without the rows and columns of

@@ -1,7 +1,10 @@
-//! Modes of a linear model: poles, vectors and their identity.
+//! Modes of a linear model: poles, vectors and their identity, and its frequency response.
 
 pub mod eigen;
 pub mod identify;
+pub mod realisation;
+pub mod response;
 
 pub use eigen::{Pair, Solver};
 pub use identify::{Candidate, Identity, Reference};
+pub use response::Response;

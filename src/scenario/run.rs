@@ -3,14 +3,16 @@
 //! Types and ranges of single values are checked before, by `table`.
 
 use super::run_file::{
-    CornerFile, FeedbackFile, NozzleJetFile, RunFile, SignsFile, SlopeFile, VariantFile,
+    CornerFile, EnvelopeFile, FeedbackFile, MarginsFile, NozzleJetFile, RunFile, SignsFile,
+    SlopeFile, VariantFile,
 };
 use super::table::Findings;
 use super::vehicle::Resolved;
 use super::{fixed, names, pattern, plan};
 use crate::campaign::definition::Feedback;
-use crate::campaign::{Definition, NozzleJet, Population, Slope, Variant};
+use crate::campaign::{Definition, LoopPlan, NozzleJet, Population, Slope, Variant};
 use crate::dispersion::{Dispersion, Draw, Listed, Scheme};
+use crate::margins::Settings;
 use crate::problem::Problems;
 use crate::spelling::allowed_instead;
 
@@ -75,6 +77,7 @@ pub fn resolve(
     modes(file, vehicle, &flight_times_s, f);
     let gimballed = gimballed(file, vehicle, f);
     servo(&variants, vehicle, &gimballed, f);
+    let margins = file.margins.as_ref().map(|margins| loops(margins, &variants, vehicle, f));
 
     let standard = |name: &str, cases, drawn, scheme| Population {
         name: name.into(),
@@ -128,6 +131,7 @@ pub fn resolve(
             gimballed,
             exchange_ratio: file.identity.exchange_ratio,
             sensitivity,
+            margins,
         },
         corners,
     }))
@@ -242,6 +246,61 @@ fn servo(variants: &[Variant], vehicle: Option<&Resolved>, gimballed: &[bool], f
             let allowed = "open, or a run that gimbals every engine of the allocation";
             f.push(key, found, allowed);
         }
+    }
+}
+
+/// Which loops are assessed, and where.
+fn loops(
+    file: &MarginsFile,
+    variants: &[Variant],
+    vehicle: Option<&Resolved>,
+    f: &mut Findings,
+) -> LoopPlan {
+    if vehicle.is_some_and(|v| v.vehicle.autopilot.is_none()) {
+        f.push("margins", "loops of a vehicle without an autopilot", "a vehicle with an autopilot");
+    }
+    let index = |name: &String| variants.iter().position(|variant| variant.name == *name);
+    let mut chosen: Vec<usize> = match &file.variants {
+        None => (0..variants.len()).filter(|&v| variants[v].feedback != Feedback::Open).collect(),
+        Some(names) => {
+            for (i, name) in names.iter().enumerate().filter(|(_, name)| index(name).is_none()) {
+                let known = variants.iter().map(|variant| variant.name.as_str());
+                let allowed = allowed_instead(name, known);
+                f.push(format!("margins.variants[{i}]"), format!("\"{name}\""), allowed);
+            }
+            names.iter().filter_map(index).collect()
+        }
+    };
+    chosen.sort_unstable();
+    chosen.dedup();
+    if chosen.is_empty() {
+        let allowed = "a variant with feedback, or `variants`";
+        f.push("margins", "no variant whose loops are assessed", allowed);
+    }
+    if !(file.highest_hz > file.lowest_hz) {
+        f.push("margins.highest_hz", file.highest_hz.to_string(), "above `lowest_hz`");
+    }
+    let envelope_hz = file.envelope.as_ref().map_or(Vec::new(), |envelope| {
+        let EnvelopeFile { from_hz, to_hz, count } = *envelope;
+        if !(from_hz >= file.lowest_hz && to_hz > from_hz && to_hz <= file.highest_hz) {
+            let found = format!("{from_hz} to {to_hz} Hz");
+            f.push("margins.envelope", found, "an interval from `lowest_hz` to `highest_hz`");
+            return Vec::new();
+        }
+        let step = (to_hz / from_hz).ln() / f64::from(count - 1);
+        (0..count).map(|i| from_hz * (step * f64::from(i)).exp()).collect()
+    });
+    LoopPlan {
+        settings: Settings {
+            gain_margin_db: file.gain_margin_db,
+            phase_margin_deg: file.phase_margin_deg,
+            lowest_hz: file.lowest_hz,
+            highest_hz: file.highest_hz,
+            points_per_decade: file.points_per_decade,
+            light_damping_ratio: file.light_damping_ratio,
+        },
+        variants: chosen,
+        envelope_hz,
     }
 }
 

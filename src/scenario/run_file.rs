@@ -3,6 +3,7 @@
 //! Types and ranges of single values live here; the rest is checked in `run`.
 
 use crate::campaign::definition::MOST_CASES;
+use crate::margins::Settings;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -39,6 +40,8 @@ pub struct RunFile {
     /// How poles are followed from the nominal to a case.
     #[serde(default)]
     pub identity: IdentityFile,
+    /// Margins of the flight control loops, if they are asked for.
+    pub margins: Option<MarginsFile>,
     /// Ways to evaluate each draw.
     #[schemars(length(min = 1))]
     pub variant: Vec<VariantFile>,
@@ -202,6 +205,80 @@ impl Default for IdentityFile {
     fn default() -> Self {
         Self { exchange_ratio: 0.5 }
     }
+}
+
+/// Margins of the flight control loops, each broken at its axis command with the others closed.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MarginsFile {
+    /// Variants whose loops are assessed (default: those with feedback closed or inverted).
+    pub variants: Option<Vec<String>>,
+    /// Gain margin asked for and height of the Nichols ellipse, dB.
+    #[serde(default = "six")]
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 40.0))]
+    pub gain_margin_db: f64,
+    /// Phase margin asked for and half width of the Nichols ellipse, degrees.
+    #[serde(default = "thirty")]
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 180.0))]
+    pub phase_margin_deg: f64,
+    /// Lowest frequency, Hz.
+    #[serde(default = "lowest_hz")]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub lowest_hz: f64,
+    /// Highest frequency, Hz; the grid goes on to twice the highest resonance and to where the loops
+    /// have died out.
+    #[serde(default = "highest_hz")]
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub highest_hz: f64,
+    /// Frequencies a decade before refinement.
+    #[serde(default = "points_per_decade")]
+    #[schemars(range(min = 10, max = 1000))]
+    pub points_per_decade: u32,
+    /// Damping ratio below which a pole is a resonance.
+    #[serde(default = "light_damping_ratio")]
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(max = 1.0))]
+    pub light_damping_ratio: f64,
+    /// Frequencies of the envelopes over the campaign, if they are asked for.
+    pub envelope: Option<EnvelopeFile>,
+}
+
+fn six() -> f64 {
+    Settings::default().gain_margin_db
+}
+
+fn thirty() -> f64 {
+    Settings::default().phase_margin_deg
+}
+
+fn lowest_hz() -> f64 {
+    Settings::default().lowest_hz
+}
+
+fn highest_hz() -> f64 {
+    Settings::default().highest_hz
+}
+
+fn points_per_decade() -> u32 {
+    Settings::default().points_per_decade
+}
+
+fn light_damping_ratio() -> f64 {
+    Settings::default().light_damping_ratio
+}
+
+/// A logarithmic grid of frequencies.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EnvelopeFile {
+    /// First frequency, Hz.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub from_hz: f64,
+    /// Last frequency, Hz.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub to_hz: f64,
+    /// Number of frequencies.
+    #[schemars(range(min = 2, max = 10_000))]
+    pub count: u32,
 }
 
 /// One way to evaluate a draw.

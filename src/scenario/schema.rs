@@ -90,7 +90,8 @@ mod tests {
         let good: Value = Value::Table(text.parse().unwrap());
         assert_eq!(keys::<T>(&good), Vec::<String>::new());
         let mut missed = 0;
-        for path in tables(&good, "") {
+        // The inputs of a path are signals by name: any key will do.
+        for path in tables(&good, "").into_iter().filter(|path| !path.ends_with("/input")) {
             let table = at(&mut good.clone(), &path).clone();
             for key in table.keys() {
                 let mut changed = good.clone();
@@ -100,7 +101,9 @@ mod tests {
                 if let [place] = found.as_slice() {
                     // A table without its tag fits no variant: the table itself is at fault.
                     let table = path.rsplit('/').next().unwrap_or_default();
-                    let named = place.ends_with(key.as_str()) || place.ends_with(table);
+                    let item = format!("[{table}]");
+                    let whole = place.ends_with(table) || place.ends_with(&item);
+                    let named = place.ends_with(key.as_str()) || whole;
                     assert!(named, "{path}/{key}: {place}");
                     missed += 1;
                 }

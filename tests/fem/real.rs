@@ -7,7 +7,7 @@
 
 use std::path::PathBuf;
 
-use tvse::fem::{NodeShape, RawMode, Results, read};
+use tvse::fem::{NodeShape, Precision, RawMode, Results, read};
 
 use super::{fixture, results};
 
@@ -119,6 +119,9 @@ fn the_free_free_model_has_278_modes_at_49_grids_as_pynastran_reads_them() {
     as_pynastran_reads(&found, "full");
     agrees_with_summary(&found, "full");
     assert_eq!(found.complete("full.op2"), Ok(()));
+    // The eigenvalues are those before augmentation: no residual vectors among them.
+    assert_eq!(found.warnings, [""; 0]);
+    assert_eq!((found.program.as_str(), found.precision), ("Nastran OP2 NX9.1", Precision::Single));
     // Six rigid-body modes, then the circular frequencies that the data set is known by.
     let rate = |k: usize| found.modes[k].frequency_hz * std::f64::consts::TAU;
     assert!((0..6).all(|k| rate(k).abs() < 1e-3));

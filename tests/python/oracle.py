@@ -111,6 +111,9 @@ class Vehicle:
         self.file = tomllib.loads((Path(folder) / "vehicle.toml").read_text())
         self.package = Package(Path(folder) / self.file["modal_package"])
         self.engines = [f"{e['group']}.{e['name']}" for e in self.file["engine"]]
+        # Alternative actuators are no part of the models here.
+        for engine in self.file["engine"]:
+            engine["actuator"] = [a for a in engine["actuator"] if "set" not in a]
 
 
 # ---------------------------------------------------------------- dispersions

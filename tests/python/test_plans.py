@@ -399,3 +399,29 @@ def test_runs_are_compared_on_common_draws_alone(small, runs, folder):
     command = [TVSE, "compare", small.folder, other.folder]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 2 and "one seed" in done.stderr
+
+
+@pytest.mark.parametrize("dispersion, plan", [
+    ("correlated", 'kind = "latin_hypercube"\nreplicates = 2'),
+    ("correlated", 'kind = "sobol"\nreplicates = 2'),
+])
+def test_threads_parts_and_extensions_give_the_same_bytes_or_are_refused(folder, dispersion, plan):
+    path = folder / "parts.toml"
+    path.write_text(scenario(dispersion, 24, plan))
+    kind = plan.split('"')[1]
+    whole, parts, short = (folder / f"{kind}-{name}" for name in ("whole", "parts", "short"))
+    tables = lambda run: {p.name: p.read_bytes() for p in sorted((run / "tables").iterdir())}
+    tvse("run", path, "-o", whole, "--jobs", 2)
+    for part in (3, 1, 2):
+        tvse("run", path, "-o", parts, "--jobs", 1, "--shard", f"{part}/3")
+    tvse("merge", parts)
+    assert tables(parts) == tables(whole)
+    tvse("run", path, "-o", short, "--cases", 16)
+    done = subprocess.run([TVSE, "run", path, "-o", short, "--extend", "8"], capture_output=True, text=True)
+    if kind == "sobol":
+        assert done.returncode == 0, done.stderr
+        assert tables(short) == tables(whole)
+        done = subprocess.run([TVSE, "run", path, "-o", short, "--extend", "3"], capture_output=True, text=True)
+        assert done.returncode == 2 and "multiple of 2" in done.stderr
+    else:
+        assert done.returncode == 2 and "keeps its first cases" in done.stderr

@@ -18,7 +18,7 @@ from blake3 import blake3
 from conftest import ROOT, TVSE, run_file, tvse
 
 TABLES = ["cases", "modes", "summary", "worst", "columns"]
-UNITS = {"": None, "1": None, "rad/s": "rad_s", "Hz": "hz", "s": "s", "sigma": None}
+UNITS = {"": None, "1": None, "rad/s": "rad_s", "Hz": "hz", "s": "s", "sigma": None, "dB": "db", "deg": "deg"}
 
 
 def path(run, table):

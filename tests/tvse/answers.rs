@@ -280,6 +280,7 @@ pub fn integrated_study() -> Study {
     study.edit(vehicle, "modal_package = \"modes\"", "modal_package = \"integrated\"");
     study.edit(vehicle, "labels = [\"m006\"]", &format!("labels = [\"{label}\"]"));
     study.edit(vehicle, "[80.0, 95.0, 100.0, 105.0, 110.0, 112.0, 114.0]", "[110.0]");
+    study.edit(vehicle, "time_s = 105.0", "time_s = 110.0");
     study
 }
 

@@ -56,7 +56,12 @@ fn wrong_entries_are_told_with_file_key_found_and_allowed() {
             "cases = 0",
             "smoke.toml: cases: found integer 0; allowed: an integer ≥ 1",
         ),
-        (RUN, "cases = 6", "", "smoke.toml: cases: found nothing; allowed: an integer"),
+        (
+            RUN,
+            "cases = 6",
+            "",
+            "smoke.toml: cases: found nothing; allowed: the number of dispersed cases",
+        ),
         (
             RUN,
             "[110.0]",

@@ -62,6 +62,7 @@ fn a_stick_model_that_comes_back_by_tables_gives_the_same_campaign() {
         "flight_times_s = [80.0, 95.0, 100.0, 105.0, 110.0, 112.0, 114.0]",
         "flight_times_s = [110.0]",
     );
+    study.edit(vehicle, "time_s = 105.0", "time_s = 110.0");
     study.edit(vehicle, "band_time_s = 100.0", "band_time_s = 110.0");
     study.edit(vehicle, "labels = [\"m006\"]", &format!("labels = [\"{label}\"]"));
     study.run("before", &[]);

@@ -15,5 +15,6 @@ mod outside;
 mod parsers;
 mod repeatability;
 mod schema;
+mod servo;
 mod stopping;
 mod study;

@@ -7,6 +7,7 @@ use super::super::results::{Opening, Results};
 use super::super::synthetic;
 use super::*;
 use crate::campaign::{StoredPoles, synthetic as cases};
+use crate::dispersion::Scheme;
 use std::fs;
 use tempfile::TempDir;
 
@@ -32,7 +33,8 @@ fn in_memory() -> TempDir {
 }
 
 fn tables(run: &Path) -> Vec<Vec<u8>> {
-    TableName::ALL.map(|table| fs::read(run.join(table.file())).unwrap()).into()
+    let tables = TableName::of_run(&outline());
+    tables.iter().map(|table| fs::read(run.join(table.file())).unwrap()).collect()
 }
 
 fn shards(run: &Path) -> Vec<PathBuf> {
@@ -340,6 +342,26 @@ fn an_extended_run_has_the_bytes_of_one_that_was_longer_from_the_start() {
 }
 
 #[test]
+fn a_plan_whose_first_cases_would_change_is_not_extended() {
+    let folder = tempfile::tempdir().unwrap();
+    for (scheme, more, told) in [
+        (Scheme::LatinHypercube { replicates: 1 }, 10, "plan of dispersed: found Latin"),
+        (Scheme::Sobol { replicates: 4 }, 10, "cases of dispersed: found 10 more"),
+        (Scheme::Sobol { replicates: 4 }, 12, ""),
+    ] {
+        let run = folder.path().join("run");
+        let mut outline = outline();
+        outline.definition.populations[1].scheme = scheme;
+        synthetic::run(&run, outline.clone(), 2).unwrap();
+        let opening = Opening::Extend(more);
+        let opened = Results::open(&run, outline, None, opening, Access::Whole);
+        let text = opened.map_or_else(|problems| problems.to_string(), |_| String::new());
+        assert!(text.contains(told) && text.is_empty() == told.is_empty(), "{text}");
+        fs::remove_dir_all(&run).unwrap();
+    }
+}
+
+#[test]
 fn any_fault_while_a_run_is_extended_leaves_one_that_goes_on() {
     let folder = in_memory();
     let long = folder.path().join("long");
@@ -357,12 +379,13 @@ fn any_fault_while_a_run_is_extended_leaves_one_that_goes_on() {
     fault::inject(None);
     extend(&run).unwrap();
     let steps = fault::taken();
-    for step in 0..steps {
+    for (step, fault) in (0..steps).flat_map(|s| [(s, Fault::Full), (s, Fault::Power)]) {
         fs::remove_dir_all(&run).unwrap();
         copy(&kept, &run);
-        fault::inject(Some((step, Fault::Power)));
-        extend(&run).unwrap_err();
+        fault::inject(Some((step, fault)));
+        let failed = extend(&run).is_err();
         fault::inject(None);
+        assert!(failed || fault == Fault::Full);
         // Before the extension is written down it is asked for again.
         let again = Opening::Resume { cases: false };
         let short = cases::outline(&[1, 50, 20], StoredPoles::All);
@@ -372,7 +395,7 @@ fn any_fault_while_a_run_is_extended_leaves_one_that_goes_on() {
         if !extended {
             extend(&run).unwrap();
         }
-        assert_eq!(tables(&run), expected, "step {step}");
+        assert_eq!(tables(&run), expected, "{fault:?} at step {step}");
     }
 }
 

@@ -295,7 +295,9 @@ fn names_are_words_and_unique() {
     assert_eq!(problem("name = \"right\"", "name = \"left\"").0, "engine[1].name");
     assert_eq!(problem("name = \"right\"", "name = \"Right one\"").0, "engine[1].name");
     assert_eq!(problem("name = \"tilt\"", "name = \"rock\"").0, "engine[0].actuator[1].name");
-    assert_eq!(problem("group = \"booster\"", "group = \"modes\"").0, "engine[0].group");
+    // The allocation misses the engine as well.
+    let renamed = problems(&edited("group = \"booster\"", "group = \"modes\""), modal());
+    assert_eq!(renamed[0].0, "engine[0].group");
     assert_eq!(problem("name = \"tvse\"", "name = \"the mode\"").0, "named_mode[0].name");
 }
 
