@@ -54,7 +54,8 @@ fn derivatives(criterion: &mut Criterion) {
             let definition = definition(&loaded, &variant, derivatives);
             let sampler = Sampler::new(&loaded.dispersion, definition.seed);
             let vehicle = &loaded.vehicle.vehicle;
-            let evaluator = Evaluator::new(vehicle, &sampler, &definition, false).expect("prepared");
+            let evaluator =
+                Evaluator::new(vehicle, &sampler, &definition, false).expect("prepared");
             let what = if derivatives { "with derivatives" } else { "alone" };
             group.bench_function(format!("{}, {what}", variant.name), |b| {
                 b.iter(|| (0..CASES).map(|case| evaluator.evaluate(1, case)).collect::<Vec<_>>());

@@ -145,7 +145,11 @@ mod tests {
         assert!((of(1).share.unwrap() - 1.0 / 5.5).abs() < 0.05);
         assert!(of(2).share.unwrap() < 1e-12 && of(2).total_bound.unwrap() > 0.5 / 5.5);
         assert_eq!(of(0).standard_deviation, Some(0.0));
-        assert_eq!(all.iter().map(|i| i.draw).collect::<Vec<_>>(), [0, 1, 2], "and the key without a slope is left out");
+        assert_eq!(
+            all.iter().map(|i| i.draw).collect::<Vec<_>>(),
+            [0, 1, 2],
+            "and the key without a slope is left out"
+        );
     }
 
     #[test]

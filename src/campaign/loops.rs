@@ -105,9 +105,13 @@ impl OpenLoop {
         solver.poles(model, &mut poles).map_err(|error| Failure::from(&error))?;
         // Axis commands are the first external inputs.
         let inputs = servo.inputs(&servo.compose(drawn), layout).columns(0, 3).into_owned();
-        let rows: Vec<Row> = (law.signals().iter())
-            .map(|&(sensor, axis)| servo.sensor_row(sensor, axis, drawn, layout))
-            .collect();
+        let signals = law.signals().iter();
+        let mut rows: Vec<Row> =
+            signals.map(|&(sensor, axis)| servo.sensor_row(sensor, axis, drawn, layout)).collect();
+        // An attitude is the integral of its rate; read from the rigid rotation itself, which is small among
+        // the balanced states, it would lose half of its digits.
+        let attitudes: Vec<usize> = (0..rows.len()).filter(|&row| !rows[row].rate).collect();
+        rows.iter_mut().for_each(|row| row.rate = true);
         let space = solver
             .state_space(model, layout.translation(), &inputs, &rows)
             .map_err(|error| Failure::from(&error))?;
@@ -116,6 +120,9 @@ impl OpenLoop {
         let mut sensed = DMatrix::zeros(rows.len(), 3);
         let g = |s: Complex<f64>| {
             response.at(s, &mut sensed);
+            for &row in &attitudes {
+                sensed.row_mut(row).iter_mut().for_each(|attitude| *attitude /= s);
+            }
             match law.response(autopilot, &drawn.autopilot, s) {
                 Some(feedback) => Matrix3::from_fn(|row, column| {
                     let products = (0..rows.len())

@@ -6,6 +6,7 @@ pub mod derivative;
 pub mod draw;
 mod draw_servo;
 pub mod evaluator;
+pub mod feedback;
 pub mod influence;
 pub mod loop_metric;
 pub mod loops;

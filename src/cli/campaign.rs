@@ -7,9 +7,9 @@ use super::{Error, PASS, gate, part};
 use crate::campaign::pool::{self, Part, Pool, Span};
 use crate::campaign::{Definition, Outline, Progress, Record};
 use crate::io::store::Access;
-use crate::io::{Opening, Results, Run, files, maker, summarise};
+use crate::io::{self, Opening, Results, Run, files, maker, summarise};
 use crate::problem::Problems;
-use crate::report::story;
+use crate::report::{self, story};
 use std::cell::RefCell;
 use std::io::Write;
 use std::path::Path;
@@ -265,7 +265,16 @@ pub fn finish(
     end(&finished.run, gates, &folder, out)
 }
 
+/// What feedback adds, where the run compares variants with and without.
+///
+/// # Errors
+/// Damage in the table.
+pub fn feedback(run: &Run) -> Result<String, Error> {
+    Ok(report::feedback::text(run.outline(), &io::feedback::added(run)?))
+}
+
 fn end(run: &Run, gates: Option<&Path>, folder: &Path, out: &mut dyn Write) -> Result<u8, Error> {
+    write!(out, "{}", feedback(run)?)?;
     for (table, content) in run.contents() {
         writeln!(out, "{}: {} rows", run.path(table).display(), content.rows)?;
     }

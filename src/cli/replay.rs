@@ -23,8 +23,13 @@ pub struct Args {
     /// Folder of the run
     run: PathBuf,
     /// Case index inside its population
-    #[arg(long, value_name = "N", allow_negative_numbers = true,
-        required_unless_present = "worst", default_value_if("worst", clap::builder::ArgPredicate::IsPresent, "0"))]
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        required_unless_present = "worst",
+        default_value_if("worst", clap::builder::ArgPredicate::IsPresent, "0")
+    )]
     case: u64,
     /// Name of a case that `tvse worst` found, instead
     #[arg(long, value_name = "NAME", conflicts_with_all = ["case", "population"])]

@@ -22,6 +22,7 @@ pub fn run(args: &Args, out: &mut dyn std::io::Write) -> Result<u8, Error> {
     let summary = summarise::summary(&run, summarise::MEMORY)?;
     let worst = summarise::worst(&run, 1)?;
     write!(out, "{}", story::story(run.outline(), &summary, &worst))?;
+    write!(out, "{}", super::campaign::feedback(&run)?)?;
     for (table, content) in run.contents() {
         writeln!(out, "{}: {} rows", run.path(table).display(), content.rows)?;
     }

@@ -253,9 +253,7 @@ impl Side {
             elastic: gained(&attachment.shape, &engine.shape_gain),
             rigid: sum(&attachment.slope, 0..rigid),
             slope: gained(&attachment.slope, &engine.slope_gain),
-            own: own
-                .map(|(k, axis)| complex(&axis.into_owned()) * z[columns.coordinate(k)])
-                .sum(),
+            own: own.map(|(k, axis)| complex(&axis.into_owned()) * z[columns.coordinate(k)]).sum(),
             translation: if rigid > 0 { C3::new(z[0], z[1], z[2]) } else { C3::zeros() },
             rotation: columns.rotation_of(z),
         }
@@ -329,8 +327,7 @@ impl Attachment {
     ) -> (Attached, EngineGradient) {
         let s = vectors.s;
         let real = C::from;
-        let [y, x] =
-            [vectors.left, vectors.right].map(|z| Side::new(self, engine, columns, z));
+        let [y, x] = [vectors.left, vectors.right].map(|z| Side::new(self, engine, columns, z));
         let mut to = EngineGradient::default();
         let mut value = real(0.0);
         // Gradients by the elastic translation and rotation of the gimbal in either vector.
@@ -445,7 +442,8 @@ impl Attachment {
         {
             let gain = |nominal: &Vector3<f64>, by: &[C3; 2]| {
                 let nominal = complex(nominal);
-                nominal.dot(&by[0]) * vectors.left[local] + nominal.dot(&by[1]) * vectors.right[local]
+                nominal.dot(&by[0]) * vectors.left[local]
+                    + nominal.dot(&by[1]) * vectors.right[local]
             };
             to.shape_gain.push(gain(shape, &by_shape));
             to.slope_gain.push(gain(slope, &by_slope));

@@ -119,13 +119,11 @@ impl Plant {
                 attachment.form(engine, &columns, &acceleration, effects, vectors);
             value += part.value;
             by_acceleration += part.acceleration;
-            gradient.gimbal =
-                own.map(|first| [vectors.product(first), vectors.product(first + 1)]);
+            gradient.gimbal = own.map(|first| [vectors.product(first), vectors.product(first + 1)]);
             for (product, actuator) in
                 gradient.gimbal.iter().flatten().zip(&engine.actuators[attachment.actuators])
             {
-                value +=
-                    product * (s * actuator.damping_n_m_s_rad + actuator.stiffness_n_m_rad);
+                value += product * (s * actuator.damping_n_m_s_rad + actuator.stiffness_n_m_rad);
             }
             engines.push(gradient);
         }

@@ -4,8 +4,11 @@
 //! The blocks are prepared once for a vehicle and a way of closing the loop; composing a drawn vehicle
 //! works on numbers alone. Mechanics is added up in `assemble`.
 
+mod blocks;
+
+use self::blocks::{Parts, Signal, Source, axes};
 use super::gradient::{C, Vectors};
-use super::interconnection::{Block, Interconnection, Member, Unknown};
+use super::interconnection::{Interconnection, Member, Unknown};
 use super::{ControlLaw, DrawnPath, DrawnVehicle, Layout, Model};
 use crate::vehicle::{
     Autopilot, Axis, FilterDraw, Law, ModeSet, Path, SensorKind, StateSpace, Vehicle, delay,
@@ -55,30 +58,6 @@ pub enum Error {
     AlgebraicLoop(Vec<String>),
 }
 
-/// What a block is made of.
-#[derive(Debug, Clone, PartialEq)]
-enum Source {
-    /// Engine, set, axis.
-    Actuator(usize, usize, usize),
-    /// A matrix that no draw changes.
-    Fixed(StateSpace),
-    /// A path, with the weights of its inputs.
-    Path(usize, DMatrix<f64>),
-    /// Sum of as many paths and loop delay.
-    Axis(usize),
-}
-
-/// A mechanical signal.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Signal {
-    /// Rotation of a gimbal: engine, axis.
-    Gimbal(usize, usize),
-    /// Its rate.
-    GimbalRate(usize, usize),
-    /// A sensor about an axis.
-    Sensor(usize, Axis),
-}
-
 /// Actuators, allocation and autopilot of a vehicle, connected.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Servo {
@@ -111,9 +90,9 @@ pub struct ServoForm {
 impl ServoForm {
     /// The part of an actuator with this torque law, linear in its matrices.
     pub fn actuator(&self, engine: usize, axis: usize, torque: &StateSpace) -> C {
-        let of = self.members.iter().find(|(source, _)| {
-            matches!(source, Source::Actuator(e, _, a) if (*e, *a) == (engine, axis))
-        });
+        let of = self.members.iter().find(
+            |(source, _)| matches!(source, Source::Actuator(e, _, a) if (*e, *a) == (engine, axis)),
+        );
         of.map_or(C::ZERO, |(_, member)| member.part(torque))
     }
 }
@@ -128,16 +107,6 @@ pub struct Row {
     pub entries: Vec<(usize, f64)>,
     /// Whether it reads the rates.
     pub rate: bool,
-}
-
-/// Names `prefix.<n>`, n from 1.
-fn numbered(prefix: &str, count: usize) -> impl Iterator<Item = String> {
-    (1..=count).map(move |n| format!("{prefix}.{n}"))
-}
-
-/// `command.<axis>` and the like.
-fn axes(prefix: &str) -> Vec<String> {
-    Axis::ALL.map(|axis| format!("{prefix}.{}", axis.name())).to_vec()
 }
 
 impl Servo {
@@ -520,113 +489,4 @@ fn path_system<'a>(
     filters.fold(StateSpace::gain(weights * gain), |system, (filter, draw)| {
         system.then(&filter.kind.state_space(draw))
     })
-}
-
-/// Blocks as they are gathered.
-#[derive(Default)]
-struct Parts {
-    blocks: Vec<Block>,
-    sources: Vec<Source>,
-    signals: Vec<Signal>,
-    /// Names of the mechanical signals.
-    names: Vec<String>,
-    torques: Vec<(usize, usize)>,
-    external: Vec<String>,
-    /// Outputs beside the torques.
-    outputs: Vec<String>,
-}
-
-impl Parts {
-    fn add(
-        &mut self,
-        name: String,
-        inputs: Vec<String>,
-        outputs: Vec<String>,
-        states: Vec<String>,
-        source: Source,
-    ) {
-        self.blocks.push(Block { name, inputs, outputs, states });
-        self.sources.push(source);
-    }
-
-    fn actuator(&mut self, vehicle: &Vehicle, [e, set, axis]: [usize; 3], gimbal: &str) {
-        let engine = &vehicle.engines[e];
-        let actuator = engine.actuator(2 * set + axis);
-        let name = format!("actuator.{}.{}", engine.path(), actuator.name);
-        let (angle, rate) = (format!("theta.{gimbal}"), format!("d.theta.{gimbal}"));
-        self.signals.extend([Signal::Gimbal(e, axis), Signal::GimbalRate(e, axis)]);
-        self.names.extend([angle.clone(), rate.clone()]);
-        self.torques.push((e, axis));
-        self.external.push(format!("gimbal.{gimbal}"));
-        let states = numbered(&name, actuator.law.order()).collect();
-        let inputs = vec![format!("gimbal.{gimbal}"), angle, rate];
-        let output = vec![format!("torque.{gimbal}")];
-        self.add(name, inputs, output, states, Source::Actuator(e, set, axis));
-    }
-
-    fn allocation(
-        &mut self,
-        autopilot: &Autopilot,
-        gimballed: &[bool],
-        gimbal: impl Fn(usize, usize) -> String,
-    ) {
-        let allocation = &autopilot.allocation;
-        let free: Vec<usize> = (0..allocation.gimbals.len())
-            .filter(|&row| gimballed[allocation.gimbals[row].0])
-            .collect();
-        let of = |&row: &usize| {
-            let (engine, axis) = allocation.gimbals[row];
-            format!("gimbal.{}", gimbal(engine, axis))
-        };
-        let matrix = DMatrix::from_fn(free.len(), 3, |i, j| allocation.matrix[free[i]][j]);
-        let outputs = free.iter().map(of).collect();
-        let source = Source::Fixed(StateSpace::gain(matrix));
-        self.add("allocation".into(), axes("command"), outputs, Vec::new(), source);
-    }
-
-    /// Paths, the sum of each axis with the loop delay, and the sign with which it joins the command.
-    fn autopilot(&mut self, autopilot: &Autopilot, sign: f64) {
-        for (i, sensor) in autopilot.sensors.iter().enumerate() {
-            for axis in Axis::ALL {
-                let name = sensor.signal(axis);
-                let mut inputs = autopilot.paths.iter().flat_map(|path| &path.input);
-                if inputs.any(|(input, _)| *input == name) {
-                    self.signals.push(Signal::Sensor(i, axis));
-                    self.names.push(name);
-                }
-            }
-        }
-        for (i, path) in autopilot.paths.iter().enumerate() {
-            let weights = path.input.iter().map(|(_, weight)| *weight);
-            let weights = DMatrix::from_iterator(1, path.input.len(), weights);
-            let inputs = path.input.iter().map(|(signal, _)| signal.clone()).collect();
-            let name = path.signal();
-            let mut states = Vec::new();
-            for filter in &path.filters {
-                states.extend(numbered(&format!("{name}.{}", filter.name), filter.kind.order()));
-            }
-            self.add(name.clone(), inputs, vec![name], states, Source::Path(i, weights));
-        }
-        // An axis without a path has no feedback.
-        let mut feedback = Vec::new();
-        let mut command = Vec::new();
-        for axis in Axis::ALL {
-            let paths = autopilot.paths.iter().filter(|path| path.axis == Some(axis));
-            let inputs: Vec<String> = paths.map(Path::signal).collect();
-            if inputs.is_empty() {
-                continue;
-            }
-            let output = format!("feedback.{}", axis.name());
-            let order = if autopilot.delay_s == 0.0 { 0 } else { autopilot.delay_order };
-            let states = numbered(&format!("{output}.delay"), order).collect();
-            let source = Source::Axis(inputs.len());
-            self.add(output.clone(), inputs, vec![output.clone()], states, source);
-            feedback.push(output);
-            command.push(format!("command.{}", axis.name()));
-        }
-        let sign = DMatrix::identity(feedback.len(), feedback.len()) * sign;
-        let source = Source::Fixed(StateSpace::gain(sign));
-        self.outputs.extend(feedback.iter().cloned());
-        self.add("loop".into(), feedback, command, Vec::new(), source);
-    }
 }

@@ -98,8 +98,7 @@ impl TankAttachment {
             by_acceleration -= felt(&left, true).cross(&right.rotation)
                 + felt(&right, false).cross(&left.rotation);
         }
-        let per_mass =
-            s * s * inertia + own * spring + by_acceleration.dot(&complex(acceleration));
+        let per_mass = s * s * inertia + own * spring + by_acceleration.dot(&complex(acceleration));
         let gradient = TankGradient {
             mass_kg: per_mass,
             frequency_rad_s: own * mass * (s * (2.0 * zeta) + 2.0 * omega),
@@ -121,9 +120,7 @@ impl TankAttachment {
             turned: sum(&self.shape, turning.clone()),
             elastic: sum(&self.shape, rigid..body),
             slope: sum(&self.slope, rigid..body),
-            own: own
-                .map(|(k, axis)| complex(&axis.into_owned()) * z[columns.coordinate(k)])
-                .sum(),
+            own: own.map(|(k, axis)| complex(&axis.into_owned()) * z[columns.coordinate(k)]).sum(),
             rotation: columns.rotation_of(z),
         }
     }

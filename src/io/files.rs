@@ -387,7 +387,7 @@ pub fn write(target: &Path, bytes: &[u8]) -> Result<(), Problems> {
 /// Writes a whole file aside, syncs and renames it unless a file has the name; whether it was given.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_new(target: &Path, bytes: &[u8]) -> Result<bool, Problems> {
     let mut aside = Aside::beside(target)?;
     aside.write_all(bytes).map_err(|e| write_problem(target, &e))?;

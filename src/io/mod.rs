@@ -5,6 +5,7 @@ mod assemble;
 pub mod column;
 mod envelope;
 mod fault;
+pub mod feedback;
 pub mod files;
 pub mod flat;
 pub mod folder;

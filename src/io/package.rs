@@ -223,7 +223,7 @@ pub fn write(
 /// `inputs` the digest of each file by its name.
 ///
 /// # Errors
-/// As for [`write`].
+/// As for [`write()`].
 pub fn write_imported(
     dir: &Path,
     made: &Made,

@@ -5,10 +5,10 @@
 
 use super::column::Column;
 use crate::campaign::Population;
+use crate::campaign::Sensitivity;
 use crate::campaign::loop_metric::loop_metrics;
 use crate::campaign::metric::metrics;
 use crate::campaign::nested::Statement;
-use crate::campaign::Sensitivity;
 use crate::campaign::outline::{Outline, StoredPoles};
 use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
 use crate::campaign::row::{CaseRow, CurveRow, LoopRow, MarginRow, ModeRow, PeakRow};
@@ -423,18 +423,24 @@ fn sensitivity(outline: &Outline) -> Vec<Column<ModeRow>> {
              its value has no slope",
             draw.key
         );
-        columns.push(Column::number(draw.damping_column(), "1", description, move |r: &ModeRow| {
-            of(r)?.damping_ratio.get(index).copied().flatten()
-        }));
+        columns.push(Column::number(
+            draw.damping_column(),
+            "1",
+            description,
+            move |r: &ModeRow| of(r)?.damping_ratio.get(index).copied().flatten(),
+        ));
     }
     for (index, draw) in outline.draws.iter().enumerate() {
         let description = format!(
             "Change of the real part of the pole per sigma of the independent normal score of {}",
             draw.key
         );
-        columns.push(Column::number(draw.real_column(), "rad/s", description, move |r: &ModeRow| {
-            of(r)?.real_part_rad_s.get(index).copied().flatten()
-        }));
+        columns.push(Column::number(
+            draw.real_column(),
+            "rad/s",
+            description,
+            move |r: &ModeRow| of(r)?.real_part_rad_s.get(index).copied().flatten(),
+        ));
     }
     columns
 }

@@ -93,8 +93,7 @@ impl Store {
         access: Access,
     ) -> Result<Self, Problems> {
         files::create_folder(folder)?;
-        let made = || Self::start(folder, outline, inputs, access);
-        made().inspect_err(|_| remove_unstarted(folder))
+        Self::start(folder, outline, inputs, access).inspect_err(|_| files::remove_if_empty(folder))
     }
 
     fn start(
@@ -104,9 +103,25 @@ impl Store {
         access: Access,
     ) -> Result<Self, Problems> {
         let locks = locked(folder, access)?;
-        if access == Access::Whole {
+        // Alone under the lock, a start that fails leaves nothing; others may need what a part wrote.
+        let alone = access == Access::Whole;
+        if alone {
             files::sweep(folder);
         }
+        Self::write_start(folder, outline, inputs, access, locks).inspect_err(|_| {
+            if alone {
+                remove_unstarted(folder);
+            }
+        })
+    }
+
+    fn write_start(
+        folder: &Path,
+        outline: Outline,
+        inputs: Option<&Inputs>,
+        access: Access,
+        locks: Vec<Lock>,
+    ) -> Result<Self, Problems> {
         if let Some(inputs) = inputs {
             inputs.write(folder)?;
         }

@@ -38,7 +38,11 @@ pub struct Found {
 ///
 /// # Errors
 /// Input: the folder holds anything else, or cannot be written.
-pub fn write(target: &Path, found: &Found, texts: Vec<(&str, String)>) -> Result<Vec<PathBuf>, Problems> {
+pub fn write(
+    target: &Path,
+    found: &Found,
+    texts: Vec<(&str, String)>,
+) -> Result<Vec<PathBuf>, Problems> {
     let json = serde_json::to_string_pretty(found).expect("numbers and names");
     let mut all = vec![(PathBuf::from(FILE), (json + "\n").into_bytes())];
     all.extend(texts.into_iter().map(|(name, text)| (PathBuf::from(name), text.into_bytes())));

@@ -10,7 +10,7 @@ use faer::linalg::evd::hessenberg::{self, HessenbergParams};
 use faer::linalg::evd::{self, ComputeEigenvectors, EvdParams};
 use faer::linalg::{householder, qr};
 use faer::{Conj, Mat, MatMut, MatRef, Par, Spec};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 
 /// A state space of n states, m inputs and p outputs, prepared for its response.
 ///
@@ -92,8 +92,8 @@ impl Response {
         if !(b.iter().chain(c).chain(d).all(|value| value.is_finite())) {
             return Err(Error::NonFinite("an input, output or direct matrix"));
         }
-        let mut state = a.clone();
-        let scale = nalgebra::linalg::balancing::balance_parlett_reinsch(&mut state);
+        let scale = scale(a);
+        let mut state = DMatrix::from_fn(n, n, |i, j| a[(i, j)] * (scale[j] / scale[i]));
         // C and Bᵀ stand above each other: both are multiplied by Q from the right.
         let mut outside = DMatrix::zeros(p + m, n);
         for column in 0..n {
@@ -213,6 +213,21 @@ impl Response {
     }
 }
 
+/// Powers of two by which the states are balanced. Entries that are small in their row and in their
+/// column have no say: where symmetry uncouples states, what rounding leaves between them would pull the
+/// scales of whole groups apart, and cost the digits that balancing is to save (Watkins, "A case where balancing is
+/// harmful", ETNA 23, 2006).
+fn scale(a: &DMatrix<f64>) -> DVector<f64> {
+    let small = f64::EPSILON.sqrt();
+    let rows: Vec<f64> = a.row_iter().map(|row| small * row.amax()).collect();
+    let columns: Vec<f64> = a.column_iter().map(|column| small * column.amax()).collect();
+    let mut counted = DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| {
+        let value = a[(i, j)];
+        if value.abs() < rows[i].min(columns[j]) { 0.0 } else { value }
+    });
+    nalgebra::linalg::balancing::balance_parlett_reinsch(&mut counted)
+}
+
 /// Turns `state` into the Hessenberg matrix `QᵀAQ` and `outside` into `outside Q`.
 fn reduce(state: &mut DMatrix<f64>, outside: &mut DMatrix<f64>) {
     let (n, rows) = (state.nrows(), outside.nrows());
@@ -323,6 +338,32 @@ mod tests {
             response.at(s, &mut found);
             let expected = 1.0 / (s * s) + 1.0 / (s * s + 0.01 * s + 1.0);
             assert!((found[(0, 0)] - expected).norm() < 1e-13 * expected.norm(), "{omega}");
+        }
+    }
+
+    #[test]
+    fn what_rounding_leaves_between_uncoupled_states_costs_no_digits() {
+        // Two oscillators; the second drives the first, and rounding the second back.
+        let mut a = DMatrix::zeros(4, 4);
+        for (at, omega) in [(0, 3.0), (2, 5.0)] {
+            a[(at, at + 1)] = 1.0;
+            a[(at + 1, at)] = -omega * omega;
+            a[(at + 1, at + 1)] = -0.01 * omega;
+        }
+        a[(1, 2)] = 1.0;
+        a[(3, 0)] = 1e-19;
+        let b = DMatrix::from_row_slice(4, 1, &[0.0, 1.0, 0.0, 1.0]);
+        let c = DMatrix::from_row_slice(2, 4, &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+        let mut response = Response::new(&a, &b, &c, &DMatrix::zeros(2, 1)).expect("finite");
+        let mut found = DMatrix::zeros(2, 1);
+        for omega in [0.1, 2.99, 4.0, 5.0] {
+            let s = Complex::new(0.0, omega);
+            response.at(s, &mut found);
+            let second = 1.0 / (s * s + 0.05 * s + 25.0);
+            let first = (1.0 + second) / (s * s + 0.03 * s + 9.0);
+            for (found, expected) in [(found[(0, 0)], first), (found[(1, 0)], second)] {
+                assert!((found - expected).norm() < 1e-13 * expected.norm(), "{omega}");
+            }
         }
     }
 

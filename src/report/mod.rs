@@ -1,6 +1,7 @@
 //! Reports: values become text for people, terminal tables first.
 
 pub mod actuator;
+pub mod feedback;
 pub mod figure;
 pub mod gates;
 pub mod how_many;

@@ -83,7 +83,8 @@ pub fn text(definition: &Definition, all: &[WorstCase], standing: &[Option<Stand
 
 /// One row per case and draw key that has a value.
 pub fn parameters(draws: &[DrawColumn], all: &[WorstCase]) -> Rows {
-    let mut rows = Rows::new(&["name", "key", "score_sigma", "value", "unit", "objective_per_sigma"]);
+    let mut rows =
+        Rows::new(&["name", "key", "score_sigma", "value", "unit", "objective_per_sigma"]);
     for case in all {
         for &(draw, value) in &case.values {
             let of = &draws[draw];
@@ -102,7 +103,8 @@ pub fn parameters(draws: &[DrawColumn], all: &[WorstCase]) -> Rows {
 
 /// The keys that make a case what it is: those with the greatest share z ∂/∂z of the objective.
 pub fn keys(draws: &[DrawColumn], case: &WorstCase) -> String {
-    let share = |(draw, by): (usize, &f64)| Some((draw, case.scores[draw]?, case.scores[draw]? * by));
+    let share =
+        |(draw, by): (usize, &f64)| Some((draw, case.scores[draw]?, case.scores[draw]? * by));
     let mut all: Vec<(usize, f64, f64)> =
         case.by_score.iter().enumerate().filter_map(share).collect();
     all.sort_by(|a, b| a.2.total_cmp(&b.2));

@@ -36,7 +36,7 @@ pub fn pade(delay_s: f64, order: usize) -> StateSpace {
     }
     let inverse = x.try_inverse().expect("its symmetric part and its chain make X regular");
     // R = 1 − e₁ᵀX⁻¹e₁ + e₁ᵀX⁻¹(sτ + X⁻¹)⁻¹X⁻¹e₁, where the first two terms add to ±1.
-    let direct = if order % 2 == 0 { 1.0 } else { -1.0 };
+    let direct = if order.is_multiple_of(2) { 1.0 } else { -1.0 };
     StateSpace {
         b: inverse.columns(0, 1) / delay_s,
         c: inverse.rows(0, 1).into_owned(),

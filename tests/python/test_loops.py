@@ -81,7 +81,7 @@ class Plant:
         cg = np.array([at("mass", time).cg_x_m.iloc[0], 0.0, 0.0])
         for engine in [e for e in self.file["engine"] if e["group"] == "booster"]:
             path, centre, axes = f"{engine['group']}.{engine['name']}", place(engine["gimbal_grid"]), []
-            for actuator in engine["actuator"]:
+            for actuator in [a for a in engine["actuator"] if "attach_grid" in a]:
                 axis = np.cross(place(actuator["attach_grid"]) - centre, actuator["action_line"])
                 for other in [np.array([1.0, 0, 0]), *axes]:
                     axis = axis - other * (other @ axis)

@@ -259,13 +259,13 @@ fn integrated(vehicle: &Vehicle, definition: &Definition) -> (Modal, String) {
         let share = engine.nozzle.ablation.map_or(0.0, |ablation| ablation.factor * burned);
         body.mass_kg += engine.nozzle.ablated(share).mass_kg;
     }
+    // The locked slosh masses are in these modes too.
+    body.mass_kg += vehicle.tanks.iter().map(|tank| tank.mass_kg(110.0)).sum::<f64>();
     let sets = vec![ModeSet { body, modes: modes.collect(), ..set.clone() }];
     let contains_engines = vehicle.engines.iter().map(|engine| engine.path()).collect();
+    let contains_tanks = vehicle.tanks.iter().map(|tank| tank.name.clone()).collect();
     let source = "integrated body".to_owned();
-    (
-        Modal { source, contains_engines, contains_tanks: Vec::new(), sets, parents: Vec::new() },
-        label(nearest),
-    )
+    (Modal { source, contains_engines, contains_tanks, sets, parents: Vec::new() }, label(nearest))
 }
 
 /// A study whose vehicle has the integrated body of the reference vehicle at 110 s, undamped.

@@ -244,7 +244,8 @@ fn near_veering_the_derivative_is_right_and_flagged() {
     let own = set.modes[set.mode("m006").unwrap()].frequency_hz;
     let above = set.modes.iter().map(|mode| mode.frequency_hz).filter(|f| *f > own);
     let neighbour = above.fold(f64::INFINITY, f64::min);
-    let text = row("modes.m006.frequency", "mode", "") + &row("booster.left.nozzle.cg", "engine", "");
+    let text =
+        row("modes.m006.frequency", "mode", "") + &row("booster.left.nozzle.cg", "engine", "");
     let dispersion = dispersion::read("test", &text, vehicle).unwrap();
     let draw = dispersion.draws().iter().position(|d| d.key.contains("m006")).unwrap();
     let elastic = variants(&loaded).swap_remove(0);
@@ -265,12 +266,15 @@ fn near_veering_the_derivative_is_right_and_flagged() {
         let record = evaluator.evaluate(index, 0);
         let found = record.evaluations[0].outcome.as_ref().unwrap()[0].clone();
         let sensitivity = found.sensitivity.as_ref().unwrap();
-        if sensitivity.is_veering() { flagged += 1 } else { plain += 1 }
+        if sensitivity.is_veering() {
+            flagged += 1
+        } else {
+            plain += 1
+        }
         let z: Vec<Option<f64>> =
             (0..2).map(|i| Some(if i == draw { (scale - 1.0) / 0.01 } else { 0.0 })).collect();
         for other in 0..2 {
-            let expected =
-                difference(&evaluator, &dispersion, &z, (other, 0), 1e-3, found.value);
+            let expected = difference(&evaluator, &dispersion, &z, (other, 0), 1e-3, found.value);
             let by = sensitivity.real_part_rad_s[other].unwrap();
             // A step of a thousandth of a σ of one per cent: rounding of poles of 1e3 rad/s.
             let scale = expected.norm().max(1e-3);
@@ -288,14 +292,22 @@ fn small() -> String {
              source = \"test\"\n"
         )
     };
-    row("structure.damping", "{ kind = \"uniform\", low = 0.0035, high = 0.0075 }", "absolute", "vehicle")
-        + &row("booster.*.thrust", "{ kind = \"normal\", mean = 1.0, sigma = 0.02 }", "scale", "booster")
-        + &row(
-            "booster.*.actuator.*.stiffness",
-            "{ kind = \"normal\", mean = 1.0, sigma = 0.12 }",
-            "scale",
-            "booster",
-        )
+    row(
+        "structure.damping",
+        "{ kind = \"uniform\", low = 0.0035, high = 0.0075 }",
+        "absolute",
+        "vehicle",
+    ) + &row(
+        "booster.*.thrust",
+        "{ kind = \"normal\", mean = 1.0, sigma = 0.02 }",
+        "scale",
+        "booster",
+    ) + &row(
+        "booster.*.actuator.*.stiffness",
+        "{ kind = \"normal\", mean = 1.0, sigma = 0.12 }",
+        "scale",
+        "booster",
+    )
 }
 
 #[test]
@@ -328,7 +340,7 @@ fn on_a_small_vehicle_the_search_equals_an_exhaustive_grid_and_the_planted_corne
 
     let objective =
         Objective { evaluator: &evaluator, dispersion: &dispersion, aim, flight_time: 0 };
-    let steps = 10;
+    let steps: usize = 10;
     let score = |i: usize| -2.5 + 5.0 * i as f64 / steps as f64;
     let side = steps + 1;
     let mut grid = Vec::new();

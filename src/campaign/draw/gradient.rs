@@ -95,7 +95,11 @@ impl Slots {
                     &air.normal_force_slope_1_rad,
                     by.normal_force_slope_1_rad,
                 ),
-                (Quantity::CenterOfPressure, &air.center_of_pressure_x_m, by.center_of_pressure_x_m),
+                (
+                    Quantity::CenterOfPressure,
+                    &air.center_of_pressure_x_m,
+                    by.center_of_pressure_x_m,
+                ),
                 (Quantity::AxialForce, &air.axial_force, by.axial_force),
                 (Quantity::PitchDamping, &air.pitch_damping, by.pitch_damping),
                 (Quantity::RollDamping, &air.roll_damping, by.roll_damping),
@@ -184,9 +188,8 @@ impl Slots {
             let number = 2 * set + axis;
             let nominal = engine.actuator(number);
             let place = Place::Actuator(index, number);
-            let own = |quantity, nominal: f64| {
-                effects[parameters.index(quantity, place)].apply(nominal)
-            };
+            let own =
+                |quantity, nominal: f64| effects[parameters.index(quantity, place)].apply(nominal);
             // The actuator with one of its numbers, or of the bearing, changed.
             let part = |changed: Quantity, changed_to: f64| {
                 let of = |quantity, nominal| {
@@ -251,8 +254,7 @@ impl Slots {
             let now = &drawn.paths[p];
             give(Target::Gain(p), path.gain, now.gain, &|v| with(&|draw| draw.gain = v));
             for (f, filter) in path.filters.iter().enumerate() {
-                let (kind, nominal, now) =
-                    (&filter.kind, filter.kind.nominal(), now.filters[f]);
+                let (kind, nominal, now) = (&filter.kind, filter.kind.nominal(), now.filters[f]);
                 let target = |quantity| Target::Filter(quantity, p, f);
                 give(target(Quantity::FilterGain), nominal.gain, now.gain, &|v| {
                     with(&|draw| draw.filters[f].gain = v)

@@ -170,7 +170,8 @@ pub fn search(
         let Some((found, evaluations)) = end else { continue };
         work.descents += 1;
         work.evaluations += evaluations;
-        work.converged += usize::from(found.gap.is_some_and(|gap| gap <= searcher(0).allowed(&found)));
+        work.converged +=
+            usize::from(found.gap.is_some_and(|gap| gap <= searcher(0).allowed(&found)));
         by_region[usize::from(region != regions[0])].push(found);
     }
     let mut cases = Vec::new();

@@ -40,8 +40,7 @@ fn a_case_stands_below_a_sample_by_its_ranges() {
 
 #[test]
 fn no_method_gives_the_witness_of_independent_draws() {
-    let all =
-        [Method::Sample, Method::Vertex, Method::Corners, Method::Box, Method::Ellipsoid];
+    let all = [Method::Sample, Method::Vertex, Method::Corners, Method::Box, Method::Ellipsoid];
     for method in all {
         assert_eq!(method.drawing(), crate::stats::Drawing::Selected);
         assert!(method.drawing().independent().is_err(), "{}", method.name());

@@ -32,8 +32,8 @@ fn motion(rigid: bool, at: Vector3<f64>, seed: usize) -> (Vec<Vector3<f64>>, Vec
 fn plant(rigid: bool, in_modes: bool) -> Plant {
     let engines =
         [("a.1".to_owned(), ["rock", "tilt"], true), ("a.2".to_owned(), ["rock", "tilt"], false)];
-    let mut layout = Layout::new(["m1", "m2", "m3"], engines)
-        .with_tanks([("lox", true), ("lh2", false)]);
+    let mut layout =
+        Layout::new(["m1", "m2", "m3"], engines).with_tanks([("lox", true), ("lh2", false)]);
     if rigid {
         layout = layout.with_rigid_body();
     }

@@ -345,8 +345,8 @@ fn an_extended_run_has_the_bytes_of_one_that_was_longer_from_the_start() {
 fn a_plan_whose_first_cases_would_change_is_not_extended() {
     let folder = tempfile::tempdir().unwrap();
     for (scheme, more, told) in [
-        (Scheme::LatinHypercube { replicates: 1 }, 10, "plan of dispersed: found Latin"),
-        (Scheme::Sobol { replicates: 4 }, 10, "cases of dispersed: found 10 more"),
+        (Scheme::LatinHypercube { replicates: 1 }, 10, "dispersed.plan: found Latin"),
+        (Scheme::Sobol { replicates: 4 }, 10, "dispersed.cases: found 10 more"),
         (Scheme::Sobol { replicates: 4 }, 12, ""),
     ] {
         let run = folder.path().join("run");

@@ -276,7 +276,11 @@ fn fixed_cases_hold_their_keys_and_free_some_in_the_cases_around_them() {
     for (from, to, key) in [
         ("\"found\"", "\"adverse\"", "fixed[0].name"),
         ("\"found\"", "\"Found\"", "fixed[0].name"),
-        ("booster.*.thrust @", "booster.*.trust @", "fixed[0].values.\"booster.*.trust @ vehicle\""),
+        (
+            "booster.*.thrust @",
+            "booster.*.trust @",
+            "fixed[0].values.\"booster.*.trust @ vehicle\"",
+        ),
         ("= 1.02", "= nan", "fixed[0].values.\"booster.*.thrust @ vehicle\""),
         ("modes.m006.*", "modes.m0066.*", "fixed[0].free[0]"),
     ] {

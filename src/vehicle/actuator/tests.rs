@@ -101,7 +101,7 @@ fn a_high_pass_gives_back_the_stiffness_that_static_pressure_feedback_costs() {
 #[test]
 fn transfer_functions_and_matrices_can_say_what_the_hydraulic_actuator_says() {
     let law = hydraulic(80.0);
-    let (k_l, k_v, a) = (7.0588235294117647e7, 20.0, 80.0);
+    let (k_l, k_v, a) = (1.0 / (1.0 / 2.4e8 + 1.0 / 1e8), 20.0, 80.0);
     let k = k_l * 1.79 * 1.79;
     // Z = r_a² K_L (s + K_v)/(s + a), G = r_a² K_L K_v/(s + a).
     let function = |n: &[f64], d: &[f64]| Arc::new(TransferFunction::new(n, d).unwrap());
