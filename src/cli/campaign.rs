@@ -206,7 +206,8 @@ fn go_on() -> String {
         let with_value = usize::from(words[at] == "--extend");
         words.drain(at..(at + 1 + with_value).min(words.len()));
     }
-    if !words.iter().any(|word| word == "--resume" || word.starts_with("--shard")) {
+    let begins = words.first().is_some_and(|word| word == "run");
+    if begins && !words.iter().any(|word| word == "--resume" || word.starts_with("--shard")) {
         words.push("--resume".to_owned());
     }
     let words: Vec<String> = words.iter().map(|word| quoted(word)).collect();
@@ -259,7 +260,9 @@ pub fn finish(
         write!(out, "{title}\n{}", story::story(run.outline(), &summary, &worst))?;
         return end(&run, gates, &folder, out);
     }
-    let finished = results.finish(jobs, WORST)?;
+    let cases = cases_of(&results.store().spans());
+    let kept = |_: &_| eprintln!("{cases} cases are kept; {}", go_on());
+    let finished = results.finish(jobs, WORST).inspect_err(kept)?;
     let outline = finished.run.outline();
     write!(out, "{title}\n{}", story::story(outline, &finished.summary, &finished.worst))?;
     end(&finished.run, gates, &folder, out)
