@@ -255,6 +255,12 @@ def test_the_closed_loop_is_the_one_that_python_control_closes(models, vehicle):
         a, b = response(expected, w), response(found, w)
         scale = np.abs(a).max(axis=(1, 2), keepdims=True)
         assert (np.abs(a - b) <= 1e-6 * scale).all(), (population, case, variant)
+        # Steps of the axis commands.
+        t = np.linspace(0.0, 3.0, 301)
+        _, want = control.step_response(expected, t, squeeze=False)
+        _, got = control.step_response(found, t, squeeze=False)
+        scale = np.abs(want).max(axis=2, keepdims=True)
+        assert (np.abs(got - want) <= 1e-5 * (scale + scale.max() * 1e-6)).all(), (case, variant)
         # Poles: every one of the program's is one of python-control's, to what rounding allows; those
         # near the origin belong to the null chain of the rigid body.
         ours, theirs = np.linalg.eigvals(found.A), expected.poles()
