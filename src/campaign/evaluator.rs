@@ -211,6 +211,7 @@ impl<'a> Evaluator<'a> {
         let mut workspace = self.take();
         let Workspace { buffers: all_buffers, cursor, vehicle, poles } = &mut workspace;
         let draws = self.draws(cursor, population, case);
+        let fixed = &self.definition.populations[population].fixed;
         let mut evaluations = Vec::new();
         for (flight_time, at) in self.times.iter().enumerate() {
             let parameters = self.sampler.dispersion().parameters();
@@ -221,7 +222,7 @@ impl<'a> Evaluator<'a> {
                 let sensitive = self.definition.sensitivity.as_ref();
                 let sensitive =
                     sensitive.is_some_and(|rule| rule.covers(variant, flight_time, case));
-                let place = self.place(at, variant, draws, &rule.fixed, vehicle);
+                let place = self.place(at, variant, draws, fixed, vehicle);
                 let outcome = drawn
                     .clone()
                     .and_then(|()| self.solve(at, &place, (variant, sensitive), buffers, poles));

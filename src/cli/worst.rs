@@ -128,9 +128,9 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let jobs = args.jobs.map_or_else(campaign::processors, usize::from);
     let pool = Pool::new(jobs).map_err(|e| Error::Usage(format!("--jobs {jobs}: {e}")))?;
     let interrupt = Interrupt::listen().map_err(|e| Error::Usage(format!("signals: {e}")))?;
-    let found = pool.install(|| {
-        worst::search(&evaluator, dispersion, definition, &plan, interrupt.stop())
-    });
+    let stop = interrupt.stop();
+    let found =
+        pool.install(|| worst::search(&evaluator, dispersion, definition, &plan, stop));
     let (mut cases, work) = found.map_err(|error| match error {
         worst::Error::Stopped => campaign::stopped(&interrupt, "in the search", false),
         error => unprepared(Path::new(&loaded.run.0), &error),

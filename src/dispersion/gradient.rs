@@ -154,3 +154,6 @@ impl Dispersion {
         found
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -121,10 +121,10 @@ pub fn sample(
     let chosen = |name: &str| POLE_COLUMNS.contains(&name);
     run.batches(TableName::Modes, chosen, population, &(0..cases), |batch| {
         for row in run.pole_rows(batch)? {
-            if now.as_ref().is_none_or(|(case, _)| *case != row.case) {
-                if let Some((case, poles)) = now.replace((row.case, empty.clone())) {
-                    finish(case, &poles);
-                }
+            if now.as_ref().is_none_or(|(case, _)| *case != row.case)
+                && let Some((case, poles)) = now.replace((row.case, empty.clone()))
+            {
+                finish(case, &poles);
             }
             let Some((_, poles)) = &mut now else { continue };
             let Some(pole) = row.pole.filter(|_| row.mode == aim.mode) else { continue };

@@ -4,7 +4,7 @@
 use super::descent::At;
 use crate::campaign::derivative::damping;
 use crate::campaign::evaluator::{Evaluator, Followed};
-use crate::campaign::record::Failure;
+use crate::campaign::record::{Failure, FailureKind};
 use crate::dispersion::Dispersion;
 use crate::modal::Reference;
 use crate::modal::identify::STEP_OVERLAP;
@@ -67,9 +67,9 @@ pub struct Spot {
 }
 
 /// An objective at one flight time.
-pub struct Objective<'a> {
+pub struct Objective<'a, 'e> {
     /// Evaluates.
-    pub evaluator: &'a Evaluator<'a>,
+    pub evaluator: &'a Evaluator<'e>,
     /// From scores to values.
     pub dispersion: &'a Dispersion,
     /// What is made least.
@@ -78,7 +78,7 @@ pub struct Objective<'a> {
     pub flight_time: usize,
 }
 
-impl Objective<'_> {
+impl Objective<'_, '_> {
     /// Variants that are looked at, with the sign of their share.
     fn sides(&self) -> impl Iterator<Item = (usize, f64)> {
         let baseline = self.aim.baseline.map(|variant| (variant, -1.0));
@@ -119,7 +119,10 @@ impl Objective<'_> {
             let of = |at: usize| self.aim.quantity.of(poles[at].pole.value);
             (0..poles.len()).min_by(|a, b| of(*a).total_cmp(&of(*b)))
         })
-        .map(|found| found.expect("an evaluation has a primary pole"))
+        .and_then(|found| {
+            let message = "the objective or its gradient is not finite";
+            found.ok_or_else(|| Failure::new(FailureKind::NonFinite, message))
+        })
     }
 
     /// The objective of the poles that `from` follows; `None` where an evaluation fails or a pole cannot be

@@ -90,8 +90,8 @@ struct Found {
 }
 
 /// What a search has at one flight time.
-struct Searcher<'a> {
-    objective: Objective<'a>,
+struct Searcher<'a, 'e> {
+    objective: Objective<'a, 'e>,
     /// Which draws are moved: those with a score and a slope.
     free: &'a [bool],
     stop: &'a AtomicBool,
@@ -204,7 +204,7 @@ fn worst(all: &[Found]) -> Option<&Found> {
     all.iter().min_by(|a, b| a.value.total_cmp(&b.value))
 }
 
-impl Searcher<'_> {
+impl Searcher<'_, '_> {
     fn stopped(&self) -> Result<(), Error> {
         if self.stop.load(Ordering::Relaxed) { Err(Error::Stopped) } else { Ok(()) }
     }
