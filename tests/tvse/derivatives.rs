@@ -340,7 +340,7 @@ fn on_a_small_vehicle_the_search_equals_an_exhaustive_grid_and_the_planted_corne
 
     let objective =
         Objective { evaluator: &evaluator, dispersion: &dispersion, aim, flight_time: 0 };
-    let steps: usize = 10;
+    let steps = 10;
     let score = |i: usize| -2.5 + 5.0 * i as f64 / steps as f64;
     let side = steps + 1;
     let mut grid = Vec::new();
