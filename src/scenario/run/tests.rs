@@ -281,7 +281,7 @@ fn fixed_cases_hold_their_keys_and_free_some_in_the_cases_around_them() {
             "booster.*.trust @",
             "fixed[0].values.\"booster.*.trust @ vehicle\"",
         ),
-        ("= 1.02", "= nan", "fixed[0].values.\"booster.*.thrust @ vehicle\""),
+        ("= 1.02", "= nan", "fixed[0].values.booster.*.thrust @ vehicle"),
         ("modes.m006.*", "modes.m0066.*", "fixed[0].free[0]"),
     ] {
         assert_eq!(keys(&(REFERENCE.to_owned() + &more.replacen(from, to, 1))), [key]);
