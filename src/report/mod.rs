@@ -6,6 +6,7 @@ pub mod figure;
 pub mod gates;
 pub mod how_many;
 pub mod import;
+pub mod influence;
 pub mod modes;
 pub mod nominal;
 mod number;
@@ -13,5 +14,6 @@ pub mod plan;
 pub mod scenario;
 pub mod statistics;
 pub mod story;
+pub mod worst;
 
 pub use number::{percent, significant};
