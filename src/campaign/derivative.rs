@@ -2,7 +2,7 @@
 //!
 //! `dλ/dz = −(yᴴ ∂L/∂z x)/(yᴴ L'(λ) x)`; the gradient of the form is made in `dynamics` and carried back
 //! through the draw. Near veering the derivative is right but good for little: the second-order change by
-//! the nearest pole says for how much.
+//! the nearest poles says for how much.
 
 use super::draw::Slots;
 use super::draw::gradient::Back;
@@ -24,7 +24,7 @@ pub struct Sensitivity {
     pub damping_ratio: Vec<Option<f64>>,
     /// Change of the real part per σ, rad/s.
     pub real_part_rad_s: Vec<Option<f64>>,
-    /// Second-order change of the pole by the nearest other pole, for one σ of each key in turn, over the
+    /// Second-order change of the pole by the nearest other poles, for one σ of each key in turn, over the
     /// first-order change (root sums of squares over the keys), −.
     pub curvature: Option<f64>,
 }
@@ -80,11 +80,15 @@ impl Place<'_> {
         form.into_iter().map(|by| by.map(|by| by * scale)).collect()
     }
 
-    /// [`Sensitivity`] of a pole, `nearest` being the pole of the same model that is nearest to it.
-    pub fn sensitivity(&self, pole: &Reference, nearest: Option<&Reference>) -> Sensitivity {
+    /// [`Sensitivity`] of a pole, `near` being the poles of the same model that are nearest to it.
+    pub fn sensitivity(
+        &self,
+        pole: &Reference,
+        near: impl IntoIterator<Item = Reference>,
+    ) -> Sensitivity {
         let by_score = self.by_score(pole);
         let squares = |of: &[Option<C>]| of.iter().flatten().map(|by| by.norm_sqr()).sum::<f64>();
-        let second = nearest.map_or(0.0, |near| self.second_order(pole, near));
+        let second: f64 = near.into_iter().map(|near| self.second_order(pole, &near)).sum();
         let curvature = (second / squares(&by_score)).sqrt();
         let finite = Some(curvature).filter(|curvature| curvature.is_finite());
         Sensitivity::new(pole.pair.pole, &by_score, finite)

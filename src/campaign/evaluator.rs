@@ -423,11 +423,12 @@ impl<'a> Evaluator<'a> {
             for (branch, found) in self.identify(at, variant, mode, buffers, poles)? {
                 let mut row = named_pole(plant, mode, branch, &at.labels[mode], &found)?;
                 if sensitive {
-                    let near = nearest(poles, row.value);
-                    let near = near.map(|near| {
-                        Reference::new(&buffers.model, buffers.solver.pair(&buffers.model, near))
+                    let Buffers { model, solver, .. } = &mut *buffers;
+                    let near = nearest(poles, row.value).map(|near| {
+                        let pair = solver.pair(model, near);
+                        Reference::new(model, pair)
                     });
-                    let sensitivity = place.sensitivity(&found.reference, near.as_ref());
+                    let sensitivity = place.sensitivity(&found.reference, near);
                     row.sensitivity = Some(Box::new(sensitivity));
                 }
                 rows.push(row);
@@ -454,10 +455,15 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// The other pole that is nearest to one of `poles`.
-fn nearest(poles: &[Complex<f64>], pole: Complex<f64>) -> Option<Complex<f64>> {
-    let others = poles.iter().copied().filter(|other| *other != pole);
-    others.min_by(|a, b| (a - pole).norm().total_cmp(&(b - pole).norm()))
+/// Poles asked for the second-order change of another: more than one, since of a symmetric vehicle the
+/// nearest may be of the other symmetry and not coupled at all.
+const NEIGHBOURS: usize = 3;
+
+/// The other poles that are nearest to one of `poles`.
+fn nearest(poles: &[Complex<f64>], pole: Complex<f64>) -> impl Iterator<Item = Complex<f64>> {
+    let mut others: Vec<_> = poles.iter().copied().filter(|other| *other != pole).collect();
+    others.sort_by(|a, b| (a - pole).norm().total_cmp(&(b - pole).norm()));
+    others.into_iter().take(NEIGHBOURS)
 }
 
 /// The row of an identified pole.
