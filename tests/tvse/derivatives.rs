@@ -59,6 +59,10 @@ fn every_kind() -> String {
     }
     text += &row("booster.left.nozzle.ablation", "engine", "");
     text += &row("booster.left.bearing.stiffness", "engine", "");
+    // The vehicle's bearing has no damping that could be scaled.
+    text += &row("booster.left.bearing.damping", "engine", "")
+        .replace("mean = 1.0, sigma = 0.01", "mean = 1e5, sigma = 1e3")
+        .replace("scale", "offset");
     for number in [
         "stiffness",
         "damping",
@@ -68,6 +72,7 @@ fn every_kind() -> String {
         "oil_stiffness",
         "leakage",
         "valve_flow_gain",
+        "valve_pressure_gain",
         "position_gain",
         "pressure_feedback",
         "pressure_corner",
