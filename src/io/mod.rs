@@ -35,6 +35,7 @@ pub mod summarise;
 #[cfg(test)]
 mod synthetic;
 pub mod table;
+pub mod worst;
 
 pub use results::{Finished, Opening, Results};
 pub use run::Run;

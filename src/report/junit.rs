@@ -60,7 +60,7 @@ mod tests {
         ]);
         assert_eq!((report.tests, report.failures, report.errors), (5, 2, 1));
         let suite = &report.test_suites[0];
-        assert_eq!((suite.name.as_str(), suite.disabled), ("runs/a & b", 1));
+        assert_eq!((suite.name.as_str(), suite.skipped), ("runs/a & b", 1));
         let TestCaseStatus::NonSuccess { message: Some(message), .. } = &suite.test_cases[1].status
         else {
             panic!("a failed gate is a failure")

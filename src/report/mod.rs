@@ -7,6 +7,7 @@ pub mod figure;
 pub mod gates;
 pub mod how_many;
 pub mod import;
+pub mod influence;
 pub mod junit;
 pub mod markdown;
 pub mod modes;
@@ -16,5 +17,6 @@ pub mod plan;
 pub mod scenario;
 pub mod statistics;
 pub mod story;
+pub mod worst;
 
 pub use number::{percent, significant};
