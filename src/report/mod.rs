@@ -1,12 +1,15 @@
 //! Reports: values become text for people, terminal tables first.
 
 pub mod actuator;
+pub mod annotations;
 pub mod feedback;
 pub mod figure;
 pub mod gates;
 pub mod how_many;
 pub mod import;
 pub mod influence;
+pub mod junit;
+pub mod markdown;
 pub mod modes;
 pub mod nominal;
 mod number;
