@@ -36,7 +36,7 @@ pub fn story(outline: &Outline, summary: &[SummaryRow], worst: &[WorstRow]) -> S
             };
             let failures = rows().filter(|row| row.group.flight_time.is_none());
             let failures = failures.map(|row| row.failures).max().unwrap_or(0);
-            let failed = if failures > 0 { format!(", {failures} failed") } else { String::new() };
+            let failed = if failures > 0 { format!(", {failures} failed, counted as unstable") } else { String::new() };
             let scheme = if p.scheme.is_monte_carlo() {
                 String::new()
             } else {
@@ -236,7 +236,7 @@ mod tests {
     fn the_story_has_a_line_for_every_variant_and_time_and_names_failures() {
         let outline = synthetic::outline(&[1, 6], StoredPoles::Named);
         let text = story(&outline, &summary(&outline), &[]);
-        assert!(text.starts_with("tvse, dispersed: 6 cases, 1 failed\n"), "{text}");
+        assert!(text.starts_with("tvse, dispersed: 6 cases, 1 failed, counted as unstable\n"), "{text}");
         let values: Vec<Vec<&str>> = text
             .lines()
             .filter(|line| line.starts_with('|') && !line.starts_with("|-"))
