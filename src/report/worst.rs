@@ -114,7 +114,8 @@ fn shares(case: &WorstCase) -> Vec<(usize, f64, f64)> {
 /// The keys that make a case what it is: those with the greatest share z ∂/∂z of the objective.
 pub fn keys(draws: &[DrawColumn], case: &WorstCase) -> String {
     let mut text = String::new();
-    for (draw, score, share) in shares(case).into_iter().take(KEYS).filter(|(.., share)| *share < 0.0)
+    for (draw, score, share) in
+        shares(case).into_iter().take(KEYS).filter(|(.., share)| *share < 0.0)
     {
         let key = &draws[draw].key;
         let share = significant(share);

@@ -173,15 +173,33 @@ fn between_bins(
 /// Cases from which indices are taken by bins.
 const LEAST_BINNED: usize = 100;
 
-/// The bin of each case by each input, and their number: twice the root of the cases, fine enough that what
-/// varies inside a bin is small beside the deviation of an index.
-fn binned(columns: &[Vec<f64>], results: &[f64]) -> Result<(Vec<Vec<usize>>, usize), Error> {
+/// How fine the bins of a given-data index are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bins {
+    /// Twice the root of the cases: what varies inside a bin is small beside the deviation of an index. Chance
+    /// puts as much between them as is taken off.
+    Fine,
+    /// Half the root of the cases: for designs, whose points lie more evenly in a bin than by chance, so that
+    /// too much is taken off; of coarse bins it is at most 1/(2√n).
+    Coarse,
+}
+
+/// The bin of each case by each input, and their number.
+fn binned(
+    columns: &[Vec<f64>],
+    results: &[f64],
+    fineness: Bins,
+) -> Result<(Vec<Vec<usize>>, usize), Error> {
     checked(columns, results)?;
     let cases = results.len();
     if cases < LEAST_BINNED {
         return Err(Error::TooFew { found: cases as u64, needed: LEAST_BINNED as u64 });
     }
-    let bins = (2.0 * (cases as f64).sqrt()).round() as usize;
+    let per_root = match fineness {
+        Bins::Fine => 2.0,
+        Bins::Coarse => 0.5,
+    };
+    let bins = (per_root * (cases as f64).sqrt()).round() as usize;
     let bin = |rank: &f64| ((rank - 0.5) * bins as f64 / cases as f64) as usize;
     Ok((columns.iter().map(|column| ranks(column).iter().map(bin).collect()).collect(), bins))
 }
@@ -191,8 +209,12 @@ fn binned(columns: &[Vec<f64>], results: &[f64]) -> Result<(Vec<Vec<usize>>, usi
 ///
 /// # Errors
 /// As [`given_data`].
-pub fn given_data_points(columns: &[Vec<f64>], results: &[f64]) -> Result<Vec<f64>, Error> {
-    let (all, bins) = binned(columns, results)?;
+pub fn given_data_points(
+    columns: &[Vec<f64>],
+    results: &[f64],
+    fineness: Bins,
+) -> Result<Vec<f64>, Error> {
+    let (all, bins) = binned(columns, results, fineness)?;
     let centred = centred(results)?;
     let index = |bin: Vec<usize>| between_bins((&bin, bins), &centred, 0..results.len(), 1.0);
     let found: Vec<f64> = all.into_iter().map(index).collect();
@@ -220,8 +242,8 @@ pub fn given_data(
     mut words: impl FnMut() -> u64,
     independent: Independent,
 ) -> Result<Indices, Error> {
-    let points = given_data_points(columns, results)?;
-    let (all, bins) = binned(columns, results)?;
+    let points = given_data_points(columns, results, Bins::Fine)?;
+    let (all, bins) = binned(columns, results, Bins::Fine)?;
     let bootstrap = Bootstrap::new(resamples, confidence, BootstrapInterval::Percentile)?;
     let centred = centred(results)?;
     let rows: Vec<f64> = (0..results.len()).map(|row| row as f64).collect();

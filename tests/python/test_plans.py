@@ -424,6 +424,25 @@ def test_outer_draws_hold_what_is_known_and_have_their_statements(runs, folder):
     low, high = scipy.stats.binomtest(met, 6).proportion_ci(0.95, "exact")
     found = (whole.outer_share_met_low, whole.outer_share_met_high)
     assert whole.outer_met == met and found == pytest.approx((low, high), rel=1e-9, abs=1e-12)
+    text = """
+[[gate]]
+id = "outer"
+metric = "damping_ratio"
+variant = "jet_damping"
+statistic = "nested_statement"
+threshold_1 = 0.0
+at_least_percent = 30.0
+confidence = 0.9
+rationale = "test"
+"""
+    (folder / "nested.gates.toml").write_text(text)
+    done = subprocess.run([TVSE, "gate", run.folder, "--gates", folder / "nested.gates.toml"], capture_output=True)
+    gate = json.loads((run.folder / "gates.json").read_text())["gates"][0]
+    assert (gate["cases"], gate["violations"], gate["value"]) == (6, 6 - met, pytest.approx(100 * met / 6))
+    passes = scipy.stats.binom.cdf(6 - met, 6, 0.7) <= 0.1
+    fails = scipy.stats.binom.sf(5 - met, 6, 0.7) <= 0.1
+    assert gate["verdict"] == ("pass" if passes else "fail" if fails else "inconclusive")
+    assert done.returncode == {"pass": 0, "fail": 1, "inconclusive": 4}[gate["verdict"]]
     means = cases.groupby("outer")[METRIC].mean()
     low, high = scipy.stats.ttest_1samp(means, 0).confidence_interval(0.95)
     assert (whole.damping_ratio_mean_low, whole.damping_ratio_mean_high) == pytest.approx((low, high), rel=1e-9)
