@@ -186,6 +186,10 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         "{} corners and {} points with derivatives evaluated; {} of {} descents ended at a stationary point",
         work.corners, work.evaluations, work.converged, work.descents
     )?;
+    for case in cases.iter().filter(|case| case.gap.is_some()) {
+        let gap = report::significant(case.gap.unwrap_or_default());
+        writeln!(out, "{}: at most {gap} more by the linear prediction", case.name)?;
+    }
     if let Err(refused) = Method::Box.drawing().independent() {
         writeln!(out, "no share, quantile or tolerance bound follows from these cases: {refused}")?;
     }
