@@ -21,7 +21,7 @@ const LAYERS: [&[&str]; 10] = [
 ];
 
 /// Third parties and the modules that may name them.
-const WALLS: [(&str, &[&str]); 9] = [
+const WALLS: [(&str, &[&str]); 10] = [
     ("faer::linalg", &["modal", "structure"]),
     ("arrow::", &["io"]),
     ("parquet::", &["io"]),
@@ -31,6 +31,7 @@ const WALLS: [(&str, &[&str]); 9] = [
     ("rand::", &["dispersion"]),
     ("comfy_table::", &["report"]),
     ("indicatif::", &["cli"]),
+    ("resvg::", &["report"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

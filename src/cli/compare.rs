@@ -5,7 +5,7 @@ use crate::campaign::{Sample, statistics};
 use crate::io::Run;
 use crate::problem::Problems;
 use crate::report::statistics::lines;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Differences of metrics between two finished runs, case by case, with 95 % intervals.
 ///
@@ -48,7 +48,7 @@ pub fn run(args: &Args, out: &mut dyn std::io::Write) -> Result<u8, Error> {
     }
     let population = |i: usize| &runs[i].outline().definition.populations[places[i]];
     let cases = common_cases(&args.first, &args.second, [population(0), population(1)])?;
-    let (keys, only) = common_draws(args, &runs, &places, cases)?;
+    let (keys, only) = common_draws([&args.first, &args.second], &runs, &places, cases)?;
     let mut names = selection::columns(&runs[0], &args.metric)?;
     let others = selection::columns(&runs[1], &[])?;
     if args.metric.is_empty() {
@@ -87,9 +87,9 @@ pub fn run(args: &Args, out: &mut dyn std::io::Write) -> Result<u8, Error> {
 }
 
 /// Number of cases that both populations have in common.
-fn common_cases(
-    first: &std::path::Path,
-    second: &std::path::Path,
+pub(super) fn common_cases(
+    first: &Path,
+    second: &Path,
     [a, b]: [&crate::campaign::Population; 2],
 ) -> Result<usize, Error> {
     let input = |found: String, allowed: &str| {
@@ -108,8 +108,8 @@ fn common_cases(
 }
 
 /// Number of draw keys that both runs have, all with equal values, and of those that one has.
-fn common_draws(
-    args: &Args,
+pub(super) fn common_draws(
+    folders: [&Path; 2],
     runs: &[Run; 2],
     places: &[usize],
     cases: usize,
@@ -129,7 +129,7 @@ fn common_draws(
         for ((a, b), (draw, _)) in first.iter().zip(&second).zip(pairs) {
             let differ = |i: &usize| a[*i].to_bits() != b[*i].to_bits();
             if let Some(case) = (0..cases).find(differ) {
-                let file = format!("{} and {}", args.first.display(), args.second.display());
+                let file = format!("{} and {}", folders[0].display(), folders[1].display());
                 let found = format!("{} and {} in case {case}", a[case], b[case]);
                 let allowed = "the same draws: one seed, one plan, one law for each key";
                 return Err(Problems::input(file, &draw.key, found, allowed).into());

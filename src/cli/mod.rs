@@ -25,6 +25,7 @@ pub mod plan;
 pub mod planar;
 pub mod progress;
 pub mod replay;
+pub mod report;
 pub mod response;
 pub mod retry;
 pub mod run;
@@ -82,6 +83,7 @@ enum Command {
     Sensitivity(sensitivity::Args),
     Compare(compare::Args),
     Gate(gate::Args),
+    Report(report::Args),
     Replay(replay::Args),
     Response(response::Args),
     HowMany(how_many::Args),
@@ -160,6 +162,7 @@ pub fn run() -> ExitCode {
         Command::Sensitivity(args) => sensitivity::run(args, &mut out),
         Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
+        Command::Report(args) => report::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
         Command::Response(args) => response::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),

@@ -196,9 +196,10 @@ fn offends(gate: &Gate, case: &CaseValue) -> bool {
     }
 }
 
-fn outcome(gate: &Gate, plan: &Plan<'_>, source: &impl Source) -> Result<Outcome, Problems> {
+/// What a gate asks of a run.
+fn query<'a>(gate: &'a Gate, plan: &Plan<'a>) -> Query<'a> {
     let selection = &gate.selection;
-    let query = Query {
+    Query {
         metric: plan.metric,
         population: &selection.population,
         variant: selection.variant.as_deref(),
@@ -206,7 +207,26 @@ fn outcome(gate: &Gate, plan: &Plan<'_>, source: &impl Source) -> Result<Outcome
         flight_times_s: selection.flight_times_s.as_deref(),
         mode: selection.mode.as_deref(),
         worst: worst(gate),
-    };
+    }
+}
+
+/// Hands the value of every case that a gate read from `file` looks at to `visit`.
+///
+/// # Errors
+/// As [`evaluate`], and what `visit` returns.
+pub fn visit(
+    gate: &Gate,
+    source: &impl Source,
+    file: &str,
+    visit: &mut dyn FnMut(CaseValue) -> Result<(), Problems>,
+) -> Result<(), Problems> {
+    let run = Run::of(source);
+    let plans = resolve(std::slice::from_ref(gate), &run, file)?;
+    plans.iter().try_for_each(|plan| source.visit(&query(gate, plan), visit))
+}
+
+fn outcome(gate: &Gate, plan: &Plan<'_>, source: &impl Source) -> Result<Outcome, Problems> {
+    let query = query(gate, plan);
     let cases = Cases::of(gate, plan, source, &query)?;
     let missing = plan.population.planned - cases.len();
     let verdict = verdict(gate, plan, &cases, missing);

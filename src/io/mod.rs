@@ -19,6 +19,7 @@ pub mod model;
 pub mod package;
 pub mod plan;
 pub mod replay;
+pub mod report;
 pub mod response;
 pub mod results;
 pub mod run;

@@ -1,10 +1,12 @@
-//! Reports: values become text for people, terminal tables first.
+//! Reports: values become text for people: terminal tables, charts, and the page of a run.
 
 pub mod actuator;
+pub mod chart;
 pub mod feedback;
 pub mod figure;
 pub mod gates;
 pub mod how_many;
+pub mod html;
 pub mod import;
 pub mod modes;
 pub mod nominal;
