@@ -24,6 +24,7 @@ pub mod part;
 pub mod plan;
 pub mod planar;
 pub mod progress;
+pub mod reference;
 pub mod replay;
 pub mod report;
 pub mod response;
@@ -91,6 +92,7 @@ enum Command {
     Margins(margins::Args),
     Actuator(actuator::Args),
     Schema(schema::Args),
+    Reference(reference::Args),
     Completions(completions::Args),
 }
 
@@ -170,6 +172,7 @@ pub fn run() -> ExitCode {
         Command::Margins(args) => margins::run(args, &mut out),
         Command::Actuator(args) => actuator::run(args, &mut out),
         Command::Schema(args) => schema::run(args, &mut out),
+        Command::Reference(args) => reference::run(args, &mut out),
         Command::Completions(args) => completions::run(args, &mut out),
     };
     let code = match result.and_then(|code| Ok(out.flush().map(|()| code)?)) {

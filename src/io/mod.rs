@@ -18,6 +18,7 @@ pub mod manifest;
 pub mod model;
 pub mod package;
 pub mod plan;
+pub mod reference;
 pub mod replay;
 pub mod report;
 pub mod response;

@@ -12,6 +12,7 @@ pub mod modes;
 pub mod nominal;
 mod number;
 pub mod plan;
+pub mod reference;
 pub mod scenario;
 pub mod statistics;
 pub mod story;

@@ -3,7 +3,7 @@
 use crate::study::{Study, said};
 use std::path::Path;
 
-const COMMANDS: [&str; 25] = [
+const COMMANDS: [&str; 27] = [
     "init",
     "check",
     "plan",
@@ -20,6 +20,7 @@ const COMMANDS: [&str; 25] = [
     "sensitivity",
     "compare",
     "gate",
+    "report",
     "replay",
     "response",
     "how-many",
@@ -28,6 +29,7 @@ const COMMANDS: [&str; 25] = [
     "actuator",
     "model",
     "schema",
+    "reference",
     "completions",
 ];
 
