@@ -30,6 +30,7 @@ const WALLS: [(&str, &[&str]); 10] = [
     ("rayon::", &["campaign"]),
     ("rand::", &["dispersion"]),
     ("comfy_table::", &["report"]),
+    ("quick_junit::", &["report"]),
     ("indicatif::", &["cli"]),
     ("resvg::", &["report"]),
 ];

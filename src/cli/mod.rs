@@ -12,6 +12,7 @@ pub mod error;
 pub mod gate;
 pub mod how_many;
 pub mod import;
+pub mod influence;
 pub mod init;
 pub mod interrupt;
 pub mod margins;
@@ -37,6 +38,7 @@ pub mod statistics;
 pub mod status;
 pub mod submit;
 pub mod summary;
+pub mod worst;
 
 pub use error::Error;
 
@@ -86,6 +88,8 @@ enum Command {
     Gate(gate::Args),
     Report(report::Args),
     Replay(replay::Args),
+    Worst(worst::Args),
+    Influence(influence::Args),
     Response(response::Args),
     HowMany(how_many::Args),
     Planar(planar::Args),
@@ -166,6 +170,8 @@ pub fn run() -> ExitCode {
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Report(args) => report::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
+        Command::Worst(args) => worst::run(args, &mut out),
+        Command::Influence(args) => influence::run(args, &mut out),
         Command::Response(args) => response::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),

@@ -1,9 +1,11 @@
 //! `tvse report`: a finished run as one HTML page, and its figures as files.
 
-use super::{Error, PASS, compare, gate, selection};
+use super::{Error, PASS, gate, selection};
 use crate::campaign::metric::{Quantity, metrics};
 use crate::campaign::sensitivity::{Input, Ranking, rank};
 use crate::campaign::{Evaluator, Sample, statistics};
+use crate::gate::Source;
+use crate::io::pair::{Common, Pair};
 use crate::io::{self, Run, files, inputs, report as gather, summarise};
 use crate::report::chart::png;
 use crate::report::html::contents::{Comparison, Distribution, Gated, PairedMetric, Shape, focus};
@@ -92,6 +94,15 @@ fn contents(args: &Args, run: &Run) -> Result<Contents, Error> {
         .map(|mode| focus(outline, &summary, population, mode))
         .collect();
     let times: Vec<usize> = focused.iter().map(|(_, time)| *time).collect();
+    let rules = args.gates.as_deref();
+    let (comparison, gates) = match &args.compare {
+        None => (None, gates(rules, run)?),
+        Some(folder) => {
+            let other = Run::open(folder)?;
+            let pair = Pair { run, baseline: &other };
+            (Some(comparison(args, &pair, folder, population)?), gates(rules, &pair)?)
+        }
+    };
     let mut contents = Contents {
         folder: args.run.display().to_string(),
         vehicle: None,
@@ -101,7 +112,7 @@ fn contents(args: &Args, run: &Run) -> Result<Contents, Error> {
         worst: summarise::worst(run, super::campaign::WORST)?,
         clouds: gather::clouds(run, population, &times)?,
         least: gather::least(run, population)?,
-        gates: gates(args, run)?,
+        gates,
         rankings: rankings(run, population)?,
         gains: gather::gains(run, population)?,
         feedback: io::feedback::added(run)?,
@@ -109,10 +120,7 @@ fn contents(args: &Args, run: &Run) -> Result<Contents, Error> {
         shapes: Vec::new(),
         failures: gather::failures(run, population)?,
         provenance: gather::provenance(&args.run)?,
-        comparison: match &args.compare {
-            Some(other) => Some(comparison(args, run, other, population)?),
-            None => None,
-        },
+        comparison,
         summary,
     };
     if outline.inputs.iter().any(|input| input.name == inputs::VEHICLE) {
@@ -125,13 +133,14 @@ fn contents(args: &Args, run: &Run) -> Result<Contents, Error> {
     Ok(contents)
 }
 
-fn gates(args: &Args, run: &Run) -> Result<Vec<Gated>, Error> {
-    let Some(path) = &args.gates else { return Ok(Vec::new()) };
-    let (rules, name) = gate::rules(path, run)?;
-    let outcomes = crate::gate::evaluate(&rules, run, &name)?;
+/// The gates with their values; those on the difference to a baseline run need the other run.
+fn gates(path: Option<&Path>, source: &impl Source) -> Result<Vec<Gated>, Error> {
+    let Some(path) = path else { return Ok(Vec::new()) };
+    let (rules, name) = gate::rules(path, source)?;
+    let outcomes = crate::gate::evaluate(&rules, source, &name)?;
     let mut gated = Vec::new();
     for (gate, outcome) in rules.into_iter().zip(outcomes) {
-        let values = gather::gate_values(run, &gate, &name)?;
+        let values = gather::gate_values(source, &gate, &name)?;
         gated.push(Gated { gate, outcome, values });
     }
     Ok(gated)
@@ -196,28 +205,28 @@ fn shapes(
     Ok(shapes)
 }
 
+/// What the two runs of a pair show on their common draws.
 fn comparison(
     args: &Args,
-    run: &Run,
+    pair: &Pair<'_>,
     folder: &Path,
     population: usize,
 ) -> Result<Comparison, Error> {
-    let other = Run::open(folder)?;
-    let there = selection::population(&other, &args.population)?;
-    let of = &run.outline().definition.populations[population];
-    let populations = [of, &other.outline().definition.populations[there]];
-    let cases = compare::common_cases(&args.run, folder, populations)?;
-    let runs = [run.clone(), other];
-    let (keys, _) = compare::common_draws([&args.run, folder], &runs, &[population, there], cases)?;
-    let names = selection::columns(&runs[0], &[])?;
-    let known = selection::columns(&runs[1], &[])?;
+    let (run, other) = (pair.run, pair.baseline);
+    let there = selection::population(other, &args.population)?;
+    let named = [files::name(&args.run), files::name(folder)];
+    let Common { cases, keys, .. } = pair.common(&args.population, [&named[0], &named[1]])?;
+    let cases = cases as usize;
+    let names = selection::columns(run, &[])?;
+    let known = selection::columns(other, &[])?;
     let mut metrics = Vec::new();
     for name in names.into_iter().filter(|name| known.contains(name)) {
-        let first = gather::columns(&runs[0], population, &[&name])?.remove(0);
-        let second = gather::columns(&runs[1], there, &[&name])?.remove(0);
+        let first = gather::columns(run, population, &[&name])?.remove(0);
+        let second = gather::columns(other, there, &[&name])?.remove(0);
         let (first, second) = (&first[..cases], &second[..cases]);
         let differences: Vec<f64> = first.iter().zip(second).map(|(a, b)| a - b).collect();
-        let lines = statistics::paired(Sample::of(of), first, second)
+        let sample = Sample::of(&run.outline().definition.populations[population]);
+        let lines = statistics::paired(sample, first, second)
             .map_err(|error| Error::Incomplete(format!("{name}: {error}")))?;
         let (dots, seen) = gather::thinned(second, &differences);
         let by_case = differences.iter().enumerate().map(|(case, value)| (case as u64, *value));
@@ -230,8 +239,8 @@ fn comparison(
     }
     Ok(Comparison {
         folder: folder.display().to_string(),
-        outline: runs[1].outline().clone(),
-        summary: summarise::summary(&runs[1], summarise::MEMORY)?,
+        outline: other.outline().clone(),
+        summary: summarise::summary(other, summarise::MEMORY)?,
         common: (cases, keys),
         metrics,
         provenance: gather::provenance(folder)?,

@@ -12,7 +12,7 @@ use crate::campaign::feedback;
 use crate::campaign::metric::{self, Quantity, metrics};
 use crate::campaign::record::damping_ratio;
 use crate::campaign::{LoopPlan, Population};
-use crate::gate::{CaseValue, Gate, visit};
+use crate::gate::{CaseValue, Gate, Source, visit};
 use crate::margins::AXES;
 use crate::margins::envelope::{LEVELS, nearest_phase_deg};
 use crate::problem::Problems;
@@ -20,6 +20,7 @@ use crate::report::chart::{Cells, Dot};
 use crate::report::html::contents::{
     Bound, Cloud, CloudVariant, Distribution, Failures, Gain, Least, LoopCharts,
 };
+use crate::report::html::loops::NICHOLS_FLOOR_DB;
 use crate::stats::{Confidence, Ordered, Probability, Sides, tolerance_bound};
 use arrow::array::{Array, AsArray};
 use arrow::datatypes::Float64Type;
@@ -35,8 +36,6 @@ const STATEMENTS: [(f64, f64); 4] = [(0.9973, 0.1), (0.99, 0.1), (0.95, 0.1), (0
 const TOLD: usize = 25;
 /// Memory for the envelopes, bytes.
 const MEMORY: usize = 256 << 20;
-/// Least magnitude of the loops in Nichols charts, dB.
-const FLOOR_DB: f64 = -60.0;
 
 /// The poles of a population by named mode and flight time; `focus` are the flight times, by mode,
 /// that are drawn large.
@@ -175,9 +174,13 @@ fn bound(population: &Population, values: &[f64]) -> Option<Bound> {
 ///
 /// # Errors
 /// What the run does not have, damage in its tables.
-pub fn gate_values(run: &Run, gate: &Gate, file: &str) -> Result<Distribution, Problems> {
+pub fn gate_values(
+    source: &impl Source,
+    gate: &Gate,
+    file: &str,
+) -> Result<Distribution, Problems> {
     let mut values = Vec::new();
-    visit(gate, run, file, &mut |CaseValue { case, value }| {
+    visit(gate, source, file, &mut |CaseValue { case, value }| {
         // A value that does not arise is no failure and no point.
         match value {
             Ok(Some(value)) => values.push((case, value)),
@@ -243,12 +246,12 @@ pub fn loops(run: &Run, population: usize) -> Result<Option<LoopCharts>, Problem
         if row.population == 0 {
             reference.insert(at, phase.quantiles[median]);
         }
-        if magnitude.largest > FLOOR_DB {
+        if magnitude.largest > NICHOLS_FLOOR_DB {
             let [x, y] = ranges
                 .entry((row.variant, row.axis))
                 .or_insert([[f64::INFINITY, f64::NEG_INFINITY]; 2]);
             *x = [x[0].min(phase.smallest), x[1].max(phase.largest)];
-            *y = [y[0].min(magnitude.smallest.max(FLOOR_DB)), y[1].max(magnitude.largest)];
+            *y = [y[0].min(magnitude.smallest.max(NICHOLS_FLOOR_DB)), y[1].max(magnitude.largest)];
         }
     }
     let nothing = || Cells::new([0.0, 1.0], [0.0, 1.0], [1, 1]);
@@ -260,7 +263,7 @@ pub fn loops(run: &Run, population: usize) -> Result<Option<LoopCharts>, Problem
         .collect();
     curves(run, plan, population, |[variant, axis, time], hertz, case, [phase, magnitude]| {
         let place = plan.variants.iter().position(|v| *v == variant);
-        if let Some(place) = place.filter(|_| magnitude > FLOOR_DB) {
+        if let Some(place) = place.filter(|_| magnitude > NICHOLS_FLOOR_DB) {
             let nominal = reference.get(&(variant, axis, time, hertz.to_bits()));
             let phase = nominal.map_or(phase, |nominal| nearest_phase_deg(phase, *nominal));
             // Of a cell the case nearest to a critical point.

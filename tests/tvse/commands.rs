@@ -22,6 +22,8 @@ const COMMANDS: [&str; 27] = [
     "gate",
     "report",
     "replay",
+    "worst",
+    "influence",
     "response",
     "how-many",
     "planar",

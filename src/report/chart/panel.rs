@@ -46,7 +46,7 @@ macro_rules! add {
 impl Panel {
     /// An empty panel; `clip` is a name that no other panel of the page has.
     pub fn new(clip: impl Into<String>, area: Area, x: Axis, y: Axis) -> Self {
-        let clip = clip.into();
+        let clip = format!("clip-{}", clip.into());
         let texts = [(); 3].map(|()| String::new());
         let [behind, inside, above] = texts;
         Self { area, x, y, clip, behind, inside, above, x_label: true, y_label: true }
@@ -218,7 +218,7 @@ impl Panel {
         let Area { left, top, width, height } = self.area;
         let (right, bottom) = (left + width, top + height);
         let mut grid = String::new();
-        let x_ticks = self.x.ticks((width / 75.0).clamp(2.0, 12.0) as usize);
+        let x_ticks = self.x.ticks((width / 62.0).clamp(2.0, 12.0) as usize);
         let y_ticks = self.y.ticks((height / 42.0).clamp(2.0, 12.0) as usize);
         let mut last = f64::NEG_INFINITY;
         for (value, text) in &x_ticks {
@@ -239,7 +239,9 @@ impl Panel {
         let mut widest = 0;
         for (value, text) in &y_ticks {
             let y = self.y(*value);
-            add!(grid, "<path class=\"grid\" d=\"M{left:.1} {y:.1}H{right:.1}\"/>");
+            if self.y_label || !self.y.label().is_empty() {
+                add!(grid, "<path class=\"grid\" d=\"M{left:.1} {y:.1}H{right:.1}\"/>");
+            }
             if self.y_label && y < last - 13.0 {
                 add!(
                     self.above,

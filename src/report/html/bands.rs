@@ -29,20 +29,21 @@ fn figure(contents: &Contents, mode: usize) -> Option<Figure> {
         contents.row(variant, mode, Some(time)).and_then(|row| row.damping_ratio.as_ref())
     };
     let variants = 0..definition.variants.len();
-    let all = variants.clone().flat_map(|v| (0..times.len()).map(move |t| (v, t)));
-    let ends = all.filter_map(|(v, t)| spread(v, t)).flat_map(|s| [s.smallest, s.largest]);
-    let ends: Vec<f64> = ends.map(|ratio| 100.0 * ratio).collect();
-    if ends.is_empty() {
-        return None;
-    }
-    let y = room(ends.into_iter().chain([0.0]));
+    // A common axis for all variants with thrust, another for those without.
+    let axis = |thrust: bool| {
+        let same = variants.clone().filter(|v| definition.variants[*v].thrust == thrust);
+        let all = same.flat_map(|v| (0..times.len()).map(move |t| (v, t)));
+        let ends = all.filter_map(|(v, t)| spread(v, t)).flat_map(|s| [s.smallest, s.largest]);
+        room(ends.map(|ratio| 100.0 * ratio).chain([0.0]))
+    };
+    variants.clone().find_map(|v| (0..times.len()).find_map(|t| spread(v, t)))?;
     let x = room(times.iter().copied());
     let columns = definition.variants.len().min(3);
     let width = (850.0 - 46.0 * (columns as f64 - 1.0)) / columns as f64;
     let (height, down) = (230.0, 300.0);
     let level = |level: f64| LEVELS.iter().position(|(l, _)| *l == level);
     let mut body = String::new();
-    for variant in variants {
+    for variant in variants.clone() {
         let (column, row) = (variant % columns, variant / columns);
         let area = Area {
             left: 64.0 + column as f64 * (width + 46.0),
@@ -54,7 +55,10 @@ fn figure(contents: &Contents, mode: usize) -> Option<Figure> {
             format!("bands-{}-{variant}", word(name)),
             area,
             Axis::linear("flight time, s", x),
-            Axis::linear(if column == 0 { "damping ratio, %" } else { "" }, y),
+            Axis::linear(
+                if column == 0 { "damping ratio, %" } else { "" },
+                axis(definition.variants[variant].thrust),
+            ),
         );
         panel.title(&definition.variants[variant].name);
         let series = variant % crate::report::chart::SERIES;
@@ -99,7 +103,7 @@ fn figure(contents: &Contents, mode: usize) -> Option<Figure> {
         id: format!("damping-{}", word(name)),
         title: format!("Damping ratio of {name} against flight time"),
         caption: "Bands from light to dark: least to greatest, 1 to 99 %, 5 to 95 % of the cases; line: median; dashed: \
-                  nominal; marks: the least damped case of each flight time."
+                  nominal; marks: the least damped case of each flight time. Variants with thrust have a common axis."
             .to_owned(),
         width: 930.0,
         height: 24.0 + rows as f64 * down,

@@ -159,6 +159,9 @@ pub struct Shape {
     pub rest_m: Vec<Vector3<f64>>,
     /// Real and imaginary part of their displacement, greatest modulus one.
     pub motion: Vec<[Vector3<f64>; 2]>,
+    /// Grids at which the rotation is shown, with its real and imaginary part, rad per unit of the greatest
+    /// displacement in m.
+    pub ribs: Vec<(usize, [Vector3<f64>; 2])>,
     /// Gimballed nozzles.
     pub nozzles: Vec<Swing>,
 }

@@ -138,6 +138,9 @@ fn gate((index, gated): (usize, &Gated)) -> Option<Figure> {
     if let Some(baseline) = &gate.selection.baseline {
         label = label.replacen(',', &format!(" less that of {baseline},"), 1);
     }
+    if gate.selection.baseline_run {
+        label = label.replacen(',', " less the baseline run,", 1);
+    }
     let threshold = match &gate.statistic {
         Statistic::ShareBelow { threshold, .. } | Statistic::ShareAbove { threshold, .. } => {
             Some(threshold.base())
@@ -155,27 +158,34 @@ fn gate((index, gated): (usize, &Gated)) -> Option<Figure> {
     };
     let marked = threshold.unwrap_or(limit);
     let on_axis = if threshold.is_some() { None } else { bound };
-    let x = room(
-        (values.points.iter().map(|p| p.0)).chain([marked]).chain(on_axis).map(|v| v * factor),
-    );
+    let drawn = (values.points.iter().map(|p| p.0)).chain([marked]).chain(on_axis);
+    let drawn: Vec<f64> = drawn.map(|value| value * factor).collect();
+    let [least, most] = room(drawn.iter().copied());
+    let smallest = drawn.iter().copied().fold(f64::INFINITY, f64::min);
+    // Times to double reach over decades.
+    let x = if smallest > 0.0 && most > 100.0 * smallest {
+        Axis::logarithmic(label, [0.8 * smallest, most])
+    } else {
+        Axis::linear(label, [least, most])
+    };
     let all = values.known + values.failed;
     let area = Area { left: 74.0, top: 24.0, width: 780.0, height: 250.0 };
     let mut panel = Panel::new(
         format!("gate-{index}"),
         area,
-        Axis::linear(label, x),
+        x,
         Axis::probability("share of the cases at or below, %", shares(all)),
     );
     let dots: Vec<Dot> =
         scores(values, below).into_iter().map(|dot| Dot { x: factor * dot.x, ..dot }).collect();
     panel.line(dots.iter().map(|d| (d.x, d.y)), "line thin s1");
     panel.dots(&dots, 1, 1.7, &gate.id, "");
-    let [[left, right], [low, high]] = panel.ends();
+    let [[_, right], [low, high]] = panel.ends();
     // Beside the line, towards the middle.
-    let beside =
-        |value: f64| if value < 0.5 * (left + right) { (5.0, "start") } else { (-5.0, "end") };
+    let middle = area.left + 0.5 * area.width;
+    let side = |px: f64| if px < middle { (5.0, "start") } else { (-5.0, "end") };
     panel.upright(marked * factor, "limit");
-    let (moved, anchor) = beside(marked * factor);
+    let (moved, anchor) = side(panel.x(marked * factor));
     let word = if threshold.is_some() { "threshold" } else { "limit" };
     let text = format!("{word} {}", number(marked * factor));
     panel.text((marked * factor, high), (moved, 14.0), anchor, "limit-text", &text);
@@ -198,7 +208,7 @@ fn gate((index, gated): (usize, &Gated)) -> Option<Figure> {
         }
     } else if let Some(bound) = bound {
         panel.upright(bound * factor, "bound");
-        let (moved, anchor) = beside(bound * factor);
+        let (moved, anchor) = side(panel.x(bound * factor));
         let text = format!("bound {}", number(bound * factor));
         panel.text((bound * factor, high), (moved, 30.0), anchor, "", &text);
     }
@@ -252,7 +262,11 @@ fn gate_table(gates: &[Gated]) -> String {
             value(outcome.bound),
             if outcome.sense == "at_least" { "≥" } else { "≤" },
             number(outcome.limit),
-            escaped(&outcome.unit.replace("percent", "%")),
+            escaped(match outcome.unit.as_str() {
+                "1" => "",
+                "percent" => "%",
+                unit => unit,
+            }),
             outcome.cases,
             outcome.violations,
             outcome.worst_case.map_or("–".to_owned(), |case| case.to_string()),

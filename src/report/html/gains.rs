@@ -62,7 +62,7 @@ fn figure(contents: &Contents, mode: usize, gains: &[&Gain], what: &str) -> Opti
         panel.dots(&dots, gain.variant, 1.9, variant, "cloud");
         let least = gain.dots.iter().min_by(|a, b| a.y.total_cmp(&b.y));
         said.extend(least.map(|dot| {
-            format!("{variant} adds at least {} % (case {})", percent(dot.y, 3), dot.case)
+            format!("least gain of {variant} {} % (case {})", percent(dot.y, 3), dot.case)
         }));
     }
     panel.finish(&mut body);
@@ -71,7 +71,7 @@ fn figure(contents: &Contents, mode: usize, gains: &[&Gain], what: &str) -> Opti
         title: format!("Damping ratio of {name} added {what}, same draws"),
         caption: format!(
             "Each mark is a case: how much its damping ratio gains over {first} at the flight time where it gains least. \
-             Above the line damping is added. {}. Thinned to cells of 1/240 by 1/150; the least gain of each is kept.",
+             Above the line damping is added; {}. Thinned to cells of 1/240 by 1/150; the least gain of each is kept.",
             said.join("; ")
         ),
         width: 890.0,

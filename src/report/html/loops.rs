@@ -8,6 +8,10 @@ use crate::report::chart::{Area, Axis, Figure, Panel, legend, room};
 
 /// Least magnitude drawn, dB.
 const FLOOR_DB: f64 = -60.0;
+/// Least magnitude in Nichols charts, dB: margins are looked for down to there.
+pub const NICHOLS_FLOOR_DB: f64 = -40.0;
+/// Change of phase from one frequency of the envelope to the next beyond which no line joins them, degrees.
+const JUMP_DEG: f64 = 100.0;
 
 /// The section, where the run has curves.
 pub fn section(contents: &Contents) -> Option<Section> {
@@ -153,10 +157,21 @@ fn nichols(
     }
     for time in 0..definition.flight_times_s.len() {
         let nominal = rows(loops, 0, variant, axis).filter(|row| row.flight_time == time);
-        let line = nominal.filter_map(|row| {
+        let points = nominal.filter_map(|row| {
             let median = LEVELS.iter().position(|level| *level == 0.5)?;
             Some((row.phase_deg?.quantiles[median], row.magnitude_db?.quantiles[median]))
         });
+        // Between resonances the frequencies of the envelope lie too far apart to be joined.
+        let mut line: Vec<(f64, f64)> = Vec::new();
+        for point in points {
+            let far = line.last().is_some_and(|last| (last.0 - point.0).abs() > JUMP_DEG);
+            if far || point.1 <= NICHOLS_FLOOR_DB {
+                panel.line(line.drain(..), "bound");
+            }
+            if point.1 > NICHOLS_FLOOR_DB {
+                line.push(point);
+            }
+        }
         panel.line(line, "bound");
     }
     panel.finish(&mut body);
@@ -167,7 +182,7 @@ fn nichols(
             "Lines: the nominal vehicle at each flight time. Marks: the loops of all cases at the frequencies of the \
              envelope, one for each cell of 1/240 by 1/150 above {} dB; phases as in the envelope, next to the nominal one's. \
              Dashed: the ellipse of {} dB and {}° about each critical point.",
-            super::number(FLOOR_DB),
+            super::number(NICHOLS_FLOOR_DB),
             super::number(settings.gain_margin_db),
             super::number(settings.phase_margin_deg)
         ),

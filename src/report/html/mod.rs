@@ -8,7 +8,7 @@ mod compare;
 pub mod contents;
 mod distribution;
 mod gains;
-mod loops;
+pub mod loops;
 mod page;
 mod poles;
 pub mod shape;

@@ -5,18 +5,23 @@ use super::{Section, number, word};
 use crate::campaign::{Definition, Evaluator};
 use crate::report::chart::{Figure, escaped};
 use crate::report::figure;
-use crate::vehicle::Vehicle;
+use crate::vehicle::{ModeSet, Vehicle};
 use nalgebra::{Complex, Vector3};
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
 /// Greatest displacement drawn, over the greatest extent of the vehicle.
-const AMPLITUDE: f64 = 0.05;
+const AMPLITUDE: f64 = 0.06;
 /// Greatest gimbal angle drawn, rad.
 const SWING: f64 = 0.35;
 /// Pictures of a period, and its length on the screen, s.
 const FRAMES: usize = 24;
 const PERIOD_S: f64 = 1.8;
+/// Least number of grids of a beam.
+const BEAM: usize = 5;
+/// Half length of the ribs that show rotation, over the greatest extent of the vehicle.
+const RIB: f64 = 0.028;
 
 /// The motion of the nominal vehicle in a named mode at the flight time and in the variant with these
 /// places in the definition of `evaluator`; none where nothing moves.
@@ -77,15 +82,44 @@ pub fn of(
         })
     };
     let pole = reference.pair.pole;
+    let lines = lines(set);
     Some(Shape {
         mode,
         variant,
         flight_time,
         pole_rad_s: [pole.re, pole.im],
-        lines: figure::lines(set),
+        ribs: ribs(&lines).map(|grid| (grid, parts(all[grid].1))).collect(),
+        lines,
         rest_m: set.grids.iter().map(|grid| grid.position_m).collect(),
         motion: all.iter().map(|(shift, _)| parts(*shift)).collect(),
         nozzles: vehicle.engines.iter().enumerate().filter_map(nozzle).collect(),
+    })
+}
+
+/// Lines through the grids: beams of a stick model, whose grids share y and z, in the order of x; others by their
+/// names.
+fn lines(set: &ModeSet) -> Vec<Vec<usize>> {
+    let millimetres = |value: f64| (1e3 * value).round() as i64;
+    let mut beams: BTreeMap<(i64, i64), Vec<usize>> = BTreeMap::new();
+    for (place, grid) in set.grids.iter().enumerate() {
+        let at = grid.position_m;
+        beams.entry((millimetres(at.y), millimetres(at.z))).or_default().push(place);
+    }
+    let x = |place: &usize| set.grids[*place].position_m.x;
+    let mut lines: Vec<Vec<usize>> =
+        beams.into_values().filter(|beam| beam.len() >= BEAM).collect();
+    if lines.is_empty() {
+        return figure::lines(set);
+    }
+    lines.iter_mut().for_each(|line| line.sort_by(|a, b| x(a).total_cmp(&x(b))));
+    lines
+}
+
+/// About a dozen grids of each line at which its rotation is shown.
+fn ribs(lines: &[Vec<usize>]) -> impl Iterator<Item = usize> + '_ {
+    lines.iter().filter(|line| line.len() >= BEAM).flat_map(|line| {
+        let step = (line.len() / 12).max(1);
+        line.iter().copied().step_by(step)
     })
 }
 
@@ -135,17 +169,26 @@ fn draw(contents: &Contents, shape: &Shape) -> Figure {
             let exit = points[nozzle.grid] + nozzle.axis_m + turn.cross(&nozzle.axis_m);
             points.push(exit);
         }
+        for (grid, turn) in &shape.ribs {
+            let half = Vector3::y() * (RIB * extent);
+            let turned = half + (frame(turn, step) * size).cross(&half);
+            points.extend([points[*grid] - turned, points[*grid] + turned]);
+        }
         points
     };
     let frames: Vec<Vec<Vector3<f64>>> = (0..FRAMES).map(points).collect();
     let still: Vec<Vector3<f64>> = (shape.rest_m.iter().copied())
         .chain(shape.nozzles.iter().map(|n| shape.rest_m[n.grid] + n.axis_m))
+        .chain(shape.ribs.iter().flat_map(|(grid, _)| {
+            let half = Vector3::y() * (RIB * extent);
+            [shape.rest_m[*grid] - half, shape.rest_m[*grid] + half]
+        }))
         .collect();
     let views = [
         View {
             title: "oblique: x aft to the right, z up, y into the picture",
-            right: Vector3::new(1.0, -0.25, 0.0),
-            up: Vector3::new(0.0, 0.6, 1.0),
+            right: Vector3::new(1.0, -0.35, 0.0),
+            up: Vector3::new(0.0, 1.1, 1.0),
             left: 20.0,
             top: 30.0,
             width: 600.0,
@@ -190,13 +233,18 @@ fn draw(contents: &Contents, shape: &Shape) -> Figure {
         let nozzles: Vec<Vec<usize>> = (shape.nozzles.iter().enumerate())
             .map(|(index, nozzle)| vec![nozzle.grid, shape.rest_m.len() + index])
             .collect();
+        let first = shape.rest_m.len() + shape.nozzles.len();
+        let ribs: Vec<Vec<usize>> = (0..shape.ribs.len())
+            .map(|index| vec![first + 2 * index, first + 2 * index + 1])
+            .collect();
         let lines = shape.lines.iter().filter(|line| line.len() > 1);
         for line in lines.clone().chain(&nozzles) {
             let _ = write!(body, "<path class=\"rest\" d=\"{}\"/>", path(&still, line));
         }
-        for (line, class) in
-            lines.map(|line| (line, "body")).chain(nozzles.iter().map(|line| (line, "nozzle")))
-        {
+        let moving = (ribs.iter().map(|line| (line, "body thin")))
+            .chain(lines.map(|line| (line, "body")))
+            .chain(nozzles.iter().map(|line| (line, "nozzle")));
+        for (line, class) in moving {
             let values: Vec<String> =
                 (frames.iter().chain(frames.first())).map(|points| path(points, line)).collect();
             let _ = write!(
@@ -213,7 +261,7 @@ fn draw(contents: &Contents, shape: &Shape) -> Figure {
     let angles: Vec<String> = (shape.nozzles.iter())
         .map(|nozzle| {
             let per_metre = modulus(&nozzle.angle_rad_m).to_degrees();
-            format!("{} {}°", nozzle.engine, number(per_metre))
+            format!("{} {}° per metre", nozzle.engine, number(per_metre))
         })
         .collect();
     for (place, text) in angles.iter().enumerate() {
@@ -235,9 +283,9 @@ fn draw(contents: &Contents, shape: &Shape) -> Figure {
             number(-100.0 * re / re.hypot(im))
         ),
         caption: format!(
-            "Grey at rest, blue displaced, orange the gimballed nozzles, drawn from pivot to exit. The greatest displacement is \
-             drawn as {} m, gimbal angles {} times more enlarged than displacements. Below: gimbal angles relative to the \
-             structure for a greatest displacement of 1 m in this mode. The animation is a period with its decay or growth left out.",
+            "Grey at rest, blue displaced (cross lines lie along y and turn with the structure), orange the gimballed nozzles, drawn from pivot to exit. The greatest displacement is \
+             drawn as {} m, gimbal angles {} times as enlarged. Below: gimbal angles relative to the \
+             structure for each metre of the greatest displacement. The animation is a period with its decay or growth left out.",
             number(size),
             number(if size > 0.0 { swing / size } else { 0.0 })
         ),
