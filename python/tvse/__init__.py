@@ -51,7 +51,7 @@ class Run:
 
         schema = pyarrow.parquet.read_schema(self.path(table))
         units = {field.name: (field.metadata or {}).get(b"unit") for field in schema}
-        return {name: unit.decode() for name, unit in units.items() if unit is not None}
+        return {name: unit.decode() for name, unit in units.items() if unit}
 
     def describe(self, table):
         """What every column means, from the metadata of the table's schema."""

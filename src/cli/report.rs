@@ -1,15 +1,20 @@
 //! `tvse report`: a finished run as one HTML page, and its figures as files.
 
 use super::{Error, PASS, gate, selection};
+use crate::campaign::influence::Influences;
 use crate::campaign::metric::{Quantity, metrics};
 use crate::campaign::sensitivity::{Input, Ranking, rank};
-use crate::campaign::{Evaluator, Sample, statistics};
+use crate::campaign::{Branch, Evaluator, Sample, statistics};
 use crate::gate::Source;
 use crate::io::pair::{Common, Pair};
 use crate::io::{self, Run, files, inputs, report as gather, summarise};
+use crate::problem::Problems;
 use crate::report::chart::png;
-use crate::report::html::contents::{Comparison, Distribution, Gated, PairedMetric, Shape, focus};
+use crate::report::html::contents::{
+    Comparison, Distribution, Gated, Influenced, PairedMetric, Shape, focus,
+};
 use crate::report::html::{Contents, Section, page, sections, shape};
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -114,6 +119,11 @@ fn contents(args: &Args, run: &Run) -> Result<Contents, Error> {
         least: gather::least(run, population)?,
         gates,
         rankings: rankings(run, population)?,
+        influences: influences(run, population)?,
+        searched: io::worst::read(&args.run, &outline.identity())?
+            .into_iter()
+            .map(|found| (found.aim, found.cases))
+            .collect(),
         gains: gather::gains(run, population)?,
         feedback: io::feedback::added(run)?,
         loops: gather::loops(run, population)?,
@@ -178,6 +188,41 @@ fn rankings(run: &Run, population: usize) -> Result<Rankings, Error> {
         }
     }
     Ok(Ok(found))
+}
+
+/// What the derivatives of the cases say of each mode and variant, at the least damped flight time that has
+/// them.
+fn influences(run: &Run, population: usize) -> Result<Vec<Influenced>, Error> {
+    let definition = &run.outline().definition;
+    if definition.sensitivity.is_none() {
+        return Ok(Vec::new());
+    }
+    let of = &definition.populations[population];
+    let mut all: BTreeMap<[usize; 3], (f64, Influences)> = BTreeMap::new();
+    run.modes(population, 0..of.cases, |row| {
+        let (Some(mode), Ok(pole)) = (row.mode, &row.outcome) else { return Ok(()) };
+        let Some(sensitivity) =
+            pole.sensitivity.as_ref().filter(|_| pole.branch == Branch::Primary)
+        else {
+            return Ok(());
+        };
+        let (sum, influences) = all.entry([mode, row.variant, row.flight_time]).or_default();
+        *sum += pole.damping_ratio();
+        influences.add(pole.damping_ratio(), sensitivity).map_err(|error| {
+            Problems::damage("tables/modes.parquet", "", error.to_string(), "finite numbers")
+        })
+    })?;
+    let mut least: BTreeMap<[usize; 2], (f64, Influenced)> = BTreeMap::new();
+    for ([mode, variant, flight_time], (sum, influences)) in all {
+        let mean = sum / influences.cases as f64;
+        if least.get(&[mode, variant]).is_none_or(|(other, _)| mean < *other) {
+            let ranking = influences.ranking(Sample::of(of).drawing());
+            let cases = [influences.cases, influences.veering];
+            let found = Influenced { variant, flight_time, mode, cases, ranking };
+            least.insert([mode, variant], (mean, found));
+        }
+    }
+    Ok(least.into_values().map(|(_, found)| found).collect())
 }
 
 /// Every named mode of the nominal vehicle at its least damped flight time.

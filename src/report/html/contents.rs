@@ -3,9 +3,11 @@
 //! They are read in `io::report`; nothing here is text.
 
 use crate::campaign::feedback::Added;
+use crate::campaign::influence::Influence;
 use crate::campaign::sensitivity::Ranking;
 use crate::campaign::statistics::Line;
 use crate::campaign::summary::{SummaryRow, WorstRow};
+use crate::campaign::worst::{Aim, WorstCase};
 use crate::campaign::{LoopPlan, Outline};
 use crate::gate::{Gate, Outcome};
 use crate::margins::envelope::EnvelopeRow;
@@ -182,6 +184,21 @@ pub struct Swing {
     pub structure_rad_m: [Vector3<f64>; 2],
 }
 
+/// What one σ of each draw does to the damping ratio of a mode, from the derivatives of the cases.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Influenced {
+    /// Index of the variant.
+    pub variant: usize,
+    /// Index of the flight time.
+    pub flight_time: usize,
+    /// Index of the mode.
+    pub mode: usize,
+    /// Cases, and those of them near veering.
+    pub cases: [u64; 2],
+    /// The draws, the most influential first.
+    pub ranking: Vec<Influence>,
+}
+
 /// Failed cases of a population.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Failures {
@@ -250,6 +267,10 @@ pub struct Contents {
     pub gates: Vec<Gated>,
     /// Rankings of the draws by metric, with the number of cases they were made from; or why there are none.
     pub rankings: Result<Vec<(String, usize, Ranking)>, String>,
+    /// Influences of the draws, where the run stores derivatives.
+    pub influences: Vec<Influenced>,
+    /// Worst-on-worst cases that were searched for.
+    pub searched: Vec<(Aim, Vec<WorstCase>)>,
     /// Damping gained over the first variant.
     pub gains: Vec<Gain>,
     /// What feedback adds, in words.

@@ -98,7 +98,39 @@ pub fn worst(contents: &Contents) -> Option<Section> {
             section.tables += &(table + "</tbody></table>");
         }
     }
+    section.tables += &searched(contents);
     (!section.tables.is_empty()).then_some(section)
+}
+
+/// Cases that `tvse worst` searched for.
+fn searched(contents: &Contents) -> String {
+    let definition = &contents.outline.definition;
+    let mut rows = String::new();
+    for (aim, cases) in &contents.searched {
+        for case in cases {
+            rows += &format!(
+                "<tr><td>{}</td><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>\
+                 <td class=\"n\">{:.1}</td><td class=\"n\">{:.1}</td><td><code>{}</code></td></tr>",
+                escaped(case.method.name()),
+                escaped(&definition.modes[aim.mode]),
+                escaped(&definition.variants[aim.variant].name),
+                definition.flight_times_s[case.flight_time],
+                number(case.objective),
+                percent(-case.pole[0] / case.pole[0].hypot(case.pole[1]), 3),
+                case.distance(),
+                case.farthest(),
+                escaped(&format!("tvse replay {} --worst {}", quoted(&contents.folder), case.name)),
+            );
+        }
+    }
+    if rows.is_empty() {
+        return String::new();
+    }
+    format!(
+        "<table><caption>Worst on worst: searched for (<code>tvse worst</code>), no sample of any population</caption><thead><tr>\
+         <th>method</th><th>mode</th><th>variant</th><th>flight time, s</th><th>objective</th><th>ζ, %</th>\
+         <th>distance, σ</th><th>farthest key, σ</th><th>command</th></tr></thead><tbody>{rows}</tbody></table>"
+    )
 }
 
 fn row(contents: &Contents, first: &WorstRow, rows: &[&&WorstRow]) -> String {

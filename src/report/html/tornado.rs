@@ -1,6 +1,6 @@
 //! Tornado charts: what the low and the high side of each draw do to the smallest damping ratio.
 
-use super::contents::Contents;
+use super::contents::{Contents, Influenced};
 use super::{Section, number, percent, word};
 use crate::campaign::sensitivity::Ranking;
 use crate::report::chart::{Area, Axis, Figure, Panel, escaped, room};
@@ -25,7 +25,73 @@ pub fn section(contents: &Contents) -> Option<Section> {
             }
         }
     }
+    section
+        .figures
+        .extend(contents.influences.iter().filter_map(|found| influence(contents, found)));
     Some(section)
+}
+
+/// Mean change of the damping ratio per σ of each draw, from derivatives.
+fn influence(contents: &Contents, found: &Influenced) -> Option<Figure> {
+    let definition = &contents.outline.definition;
+    let (variant, mode) = (&definition.variants[found.variant].name, &definition.modes[found.mode]);
+    let time = definition.flight_times_s[found.flight_time];
+    let bars = &found.ranking[..found.ranking.len().min(MOST)];
+    if bars.is_empty() {
+        return None;
+    }
+    let ends = bars.iter().flat_map(|b| b.mean_interval.unwrap_or([b.mean; 2]).map(|v| 100.0 * v));
+    let x = room(ends.chain([0.0]));
+    let row = 21.0;
+    let height = row * bars.len() as f64 + 8.0;
+    let area = Area { left: 400.0, top: 10.0, width: 400.0, height };
+    let y = Axis::linear("", [-(bars.len() as f64) + 0.3, 0.7]);
+    let id = format!("influence-{}-{}", word(variant), word(mode));
+    let axis = Axis::linear("mean change of the damping ratio for one σ, %", x);
+    let mut panel = Panel::new(id.clone(), area, axis, y).bare(false, true);
+    for (place, influence) in bars.iter().enumerate() {
+        let at = -(place as f64);
+        let class = if influence.mean < 0.0 { "fill s0" } else { "fill s1" };
+        panel.bar([0.0, 100.0 * influence.mean], at, 0.62 * row, class);
+        if let Some(ends) = influence.mean_interval {
+            panel.line(ends.map(|end| (100.0 * end, at)), "bound");
+        }
+        panel.text(
+            (x[0], at),
+            (-8.0, 4.0),
+            "end",
+            "",
+            &short(&contents.outline.draws[influence.draw].key),
+        );
+        let share =
+            influence.share.map_or(String::new(), |share| format!("{} %", percent(share, 0)));
+        panel.text((x[1], at), (10.0, 4.0), "start", "small note", &share);
+    }
+    panel.upright(0.0, "zero");
+    let mut body = String::new();
+    panel.finish(&mut body);
+    let [cases, veering] = found.cases;
+    Some(Figure {
+        id,
+        title: format!("Eigenvalue derivatives: {mode}, {variant}, at {time} s"),
+        caption: format!(
+            "Mean over {cases} cases of the derivative of the damping ratio with respect to the normal score of each draw, with its 95 % \
+             interval, and on the right the share of the variance that is linear in it. {veering} cases are near veering, where a \
+             derivative holds for small changes only. All numbers: tvse influence."
+        ),
+        width: 910.0,
+        height: 10.0 + height + 46.0,
+        body,
+    })
+}
+
+/// A draw key that fits beside the bars.
+fn short(key: &str) -> String {
+    if key.chars().count() > 56 {
+        key.chars().take(55).chain(['…']).collect()
+    } else {
+        key.to_owned()
+    }
 }
 
 fn figure(contents: &Contents, metric: &str, cases: usize, ranking: &Ranking) -> Option<Figure> {
@@ -56,12 +122,7 @@ fn figure(contents: &Contents, metric: &str, cases: usize, ranking: &Ranking) ->
         for (end, class) in [(low, "fill s1"), (high, "fill s0")] {
             panel.bar([middle, end], at, 0.62 * row, class);
         }
-        let short: String = if effect.key.chars().count() > 56 {
-            effect.key.chars().take(55).chain(['…']).collect()
-        } else {
-            effect.key.clone()
-        };
-        panel.text((x[0], at), (-8.0, 4.0), "end", "", &short);
+        panel.text((x[0], at), (-8.0, 4.0), "end", "", &short(&effect.key));
         let said = effect
             .total
             .or(effect.first_order)
