@@ -21,7 +21,7 @@ const LAYERS: [&[&str]; 10] = [
 ];
 
 /// Third parties and the modules that may name them.
-const WALLS: [(&str, &[&str]); 10] = [
+const WALLS: [(&str, &[&str]); 11] = [
     ("faer::linalg", &["modal", "structure"]),
     ("arrow::", &["io"]),
     ("parquet::", &["io"]),

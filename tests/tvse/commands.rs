@@ -3,7 +3,7 @@
 use crate::study::{Study, said};
 use std::path::Path;
 
-const COMMANDS: [&str; 27] = [
+const COMMANDS: [&str; 29] = [
     "init",
     "check",
     "plan",

@@ -26,6 +26,7 @@ fn figure(contents: &Contents, other: &Comparison, metric: &PairedMetric) -> Opt
         return None;
     }
     let (factor, label) = shown(&metric.name, "1");
+    let unit = label.rsplit(' ').next().unwrap_or_default().to_owned();
     let scaled = |dot: &Dot| Dot { x: factor * dot.x, y: factor * dot.y, ..*dot };
     let dots: Vec<Dot> = metric.dots.iter().map(scaled).collect();
     let id = format!("difference-{}", word(&metric.name));
@@ -37,8 +38,8 @@ fn figure(contents: &Contents, other: &Comparison, metric: &PairedMetric) -> Opt
     let mut panel = Panel::new(
         format!("{id}-cloud"),
         area(74.0),
-        Axis::linear(format!("value in {}", name(&other.folder)), ends),
-        Axis::linear("difference", y),
+        Axis::linear(format!("value in {}, {unit}", name(&other.folder)), ends),
+        Axis::linear(format!("difference, {unit}"), y),
     );
     panel.title("difference by case");
     panel.level(0.0, "zero");
@@ -49,7 +50,7 @@ fn figure(contents: &Contents, other: &Comparison, metric: &PairedMetric) -> Opt
     let mut panel = Panel::new(
         format!("{id}-distribution"),
         area(520.0),
-        Axis::linear("difference", room(points.iter().map(|d| d.x).chain([0.0]))),
+        Axis::linear(format!("difference, {unit}"), room(points.iter().map(|d| d.x).chain([0.0]))),
         Axis::probability(
             "share of the cases at or below, %",
             shares(metric.differences.known + metric.differences.failed),

@@ -27,12 +27,12 @@ pub fn section(contents: &Contents) -> Option<Section> {
 }
 
 /// Rows of a population, variant and axis.
-fn rows<'a>(
-    loops: &'a LoopCharts,
+fn rows(
+    loops: &LoopCharts,
     population: usize,
     variant: usize,
     axis: usize,
-) -> impl Iterator<Item = &'a EnvelopeRow> + Clone {
+) -> impl Iterator<Item = &EnvelopeRow> + Clone {
     let wanted = move |row: &&EnvelopeRow| {
         (row.population, row.variant, row.axis) == (population, variant, axis)
     };

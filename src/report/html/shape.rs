@@ -261,7 +261,7 @@ fn draw(contents: &Contents, shape: &Shape) -> Figure {
     let angles: Vec<String> = (shape.nozzles.iter())
         .map(|nozzle| {
             let per_metre = modulus(&nozzle.angle_rad_m).to_degrees();
-            format!("{} {}° per metre", nozzle.engine, number(per_metre))
+            format!("{}: gimbal angle {}° per metre", nozzle.engine, number(per_metre))
         })
         .collect();
     for (place, text) in angles.iter().enumerate() {

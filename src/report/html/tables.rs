@@ -68,11 +68,10 @@ pub fn summary(contents: &Contents) -> Section {
 pub fn worst(contents: &Contents) -> Option<Section> {
     let mut section = Section::new("worst", "Worst cases");
     let definition = &contents.outline.definition;
-    section.text = format!(
-        "<p>The command of a row rebuilds the case from its seed and compares it with the stored rows bit for bit; it writes \
+    section.text = "<p>The command of a row rebuilds the case from its seed and compares it with the stored rows bit for bit; it writes \
          matrices, poles and vectors to the folder to which the case number links. All draws of these cases are in \
          <a href=\"tables/worst.parquet\">tables/worst.parquet</a> of the run's folder.</p>"
-    );
+        .to_owned();
     for (mode, name) in definition.modes.iter().enumerate() {
         for (variant, v) in definition.variants.iter().enumerate() {
             let of = |row: &&WorstRow| {
