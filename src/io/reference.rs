@@ -41,7 +41,8 @@ pub fn columns() -> Vec<ColumnDoc> {
             unit: d.unit,
             description: d
                 .description
-                .replace("variant variant, mode mode", "of a variant and mode"),
+                .replace("variant variant, mode mode", "of a variant and mode")
+                .replace("variant variant", "of a variant"),
         })
         .collect()
 }

@@ -162,7 +162,7 @@ pub fn columns<'a>(all: impl Iterator<Item = [&'a str; 5]>) -> String {
             last = table;
         }
         let unit = if unit.is_empty() { "–" } else { unit };
-        add!(page, "| `{name}` | {type_name} | {} | {} |", cell(unit), cell(description));
+        add!(page, "| `{name}` | {} | {} | {} |", cell(type_name), cell(unit), cell(description));
     }
     page
 }
