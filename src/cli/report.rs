@@ -63,11 +63,12 @@ const SCALE: f32 = 2.0;
 /// inputs; output that cannot be written.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let run = Run::open(&args.run)?;
-    let contents = contents(args, &run)?;
+    let target = args.output.clone().unwrap_or_else(|| args.run.join("report.html"));
+    let within = files::resolved(target.parent().unwrap_or(Path::new("")));
+    let contents = contents(args, &run, within == files::resolved(&args.run))?;
     let sections = sections(&contents);
     let title = format!("tvse report: {}", contents.outline.definition.name);
     let subtitle = contents.vehicle.clone().unwrap_or_default();
-    let target = args.output.clone().unwrap_or_else(|| args.run.join("report.html"));
     files::write(&target, page(&title, &subtitle, &sections).as_bytes())?;
     writeln!(out, "{}", target.display())?;
     if let Some(folder) = &args.figures {
@@ -90,7 +91,7 @@ fn write_figures(folder: &Path, sections: &[Section], out: &mut dyn Write) -> Re
     Ok(())
 }
 
-fn contents(args: &Args, run: &Run) -> Result<Contents, Error> {
+fn contents(args: &Args, run: &Run, beside: bool) -> Result<Contents, Error> {
     let outline = run.outline();
     let definition = &outline.definition;
     let population = selection::population(run, &args.population)?;
@@ -110,6 +111,7 @@ fn contents(args: &Args, run: &Run) -> Result<Contents, Error> {
     };
     let mut contents = Contents {
         folder: args.run.display().to_string(),
+        beside,
         vehicle: None,
         structural_damping: None,
         outline: outline.clone(),

@@ -200,7 +200,8 @@ impl Panel {
                 escaped(text)
             );
         }
-        self.upright_label(right + 46.0, label);
+        let widest = ticks.iter().map(|(_, text)| text.chars().count()).max().unwrap_or(0);
+        self.upright_label(right + 24.0 + 6.8 * widest as f64, label);
     }
 
     fn upright_label(&mut self, x: f64, label: &str) {

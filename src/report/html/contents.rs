@@ -247,6 +247,8 @@ pub struct Comparison {
 pub struct Contents {
     /// Folder of the run, as the user named it.
     pub folder: String,
+    /// Whether the report lies in that folder, so that it can link to what lies there.
+    pub beside: bool,
     /// Name of the vehicle, as its file has it.
     pub vehicle: Option<String>,
     /// Structural damping ratio of the nominal vehicle, −.

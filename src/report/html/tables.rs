@@ -68,10 +68,18 @@ pub fn summary(contents: &Contents) -> Section {
 pub fn worst(contents: &Contents) -> Option<Section> {
     let mut section = Section::new("worst", "Worst cases");
     let definition = &contents.outline.definition;
-    section.text = "<p>The command of a row rebuilds the case from its seed and compares it with the stored rows bit for bit; it writes \
-         matrices, poles and vectors to the folder to which the case number links. All draws of these cases are in \
-         <a href=\"tables/worst.parquet\">tables/worst.parquet</a> of the run's folder.</p>"
-        .to_owned();
+    let (folder, table) = if contents.beside {
+        (
+            "to which the case number links",
+            "<a href=\"tables/worst.parquet\">tables/worst.parquet</a>",
+        )
+    } else {
+        ("<code>replay/</code> of the run", "tables/worst.parquet")
+    };
+    section.text = format!(
+        "<p>The command of a row rebuilds the case from its seed, compares it with the stored rows bit for bit, and writes matrices, \
+         poles and vectors to the folder {folder}. All draws of these cases are in {table} of the run's folder.</p>"
+    );
     for (mode, name) in definition.modes.iter().enumerate() {
         for (variant, v) in definition.variants.iter().enumerate() {
             let of = |row: &&WorstRow| {
@@ -149,8 +157,13 @@ fn row(contents: &Contents, first: &WorstRow, rows: &[&&WorstRow]) -> String {
         value.map_or("–".to_owned(), |value| format!("{value:.digits$}"))
     };
     let case = first.case;
+    let link = if contents.beside {
+        format!("<a href=\"replay/{}-{case}/\">{case}</a>", escaped(&population.name))
+    } else {
+        case.to_string()
+    };
     format!(
-        "<tr id=\"case-{case}-{v}-{m}\"><td class=\"n\"><a href=\"replay/{name}-{case}/\">{case}</a></td><td class=\"n\">{}</td>\
+        "<tr id=\"case-{case}-{v}-{m}\"><td class=\"n\">{link}</td><td class=\"n\">{}</td>\
          <td class=\"n\">{}</td><td class=\"n\">{}</td><td>{}</td><td><code>{}</code></td></tr>",
         first.flight_time_s.map_or("–".to_owned(), |time| time.to_string()),
         percent(first.damping_ratio, 3),
@@ -159,7 +172,6 @@ fn row(contents: &Contents, first: &WorstRow, rows: &[&&WorstRow]) -> String {
         escaped(&replay(contents, &population.name, case)),
         v = first.variant,
         m = first.mode,
-        name = escaped(&population.name),
     )
 }
 
