@@ -240,8 +240,11 @@ fn of_modes(
     last.map_or(Ok(()), |last| finish(last, &mut places))
 }
 
+/// What takes a number from a row of the table `modes`.
+type Getter = Box<dyn Fn(&ModeRow) -> Option<f64>>;
+
 /// How a metric is taken from a row of the table `modes`.
-fn getter(run: &Run, metric: &Metric) -> Box<dyn Fn(&ModeRow) -> Option<f64>> {
+fn getter(run: &Run, metric: &Metric) -> Getter {
     let columns = schema::modes(run.outline());
     match columns.into_iter().find(|column| column.name == metric.name).map(|column| column.get) {
         Some(Get::Number(get)) => get,
