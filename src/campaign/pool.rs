@@ -140,9 +140,11 @@ impl Pool {
                     let sender = sender.clone();
                     scope.spawn(move |_| {
                         let mut records = Vec::new();
-                        if !abandoned.load(Ordering::Relaxed) {
-                            let case = |case| guarded(definition, block.population, case, evaluate);
-                            records.extend(block.cases.map(case));
+                        for case in block.cases {
+                            if abandoned.load(Ordering::Relaxed) || stop.load(Ordering::Relaxed) {
+                                break;
+                            }
+                            records.push(guarded(definition, block.population, case, evaluate));
                         }
                         // The receiver is gone only after an error, when nobody wants the block.
                         let _ = sender.send((index, records));
