@@ -21,7 +21,7 @@ const LAYERS: [&[&str]; 10] = [
 ];
 
 /// Third parties and the modules that may name them.
-const WALLS: [(&str, &[&str]); 9] = [
+const WALLS: [(&str, &[&str]); 10] = [
     ("faer::linalg", &["modal", "structure"]),
     ("arrow::", &["io"]),
     ("parquet::", &["io"]),
@@ -30,6 +30,7 @@ const WALLS: [(&str, &[&str]); 9] = [
     ("rayon::", &["campaign"]),
     ("rand::", &["dispersion"]),
     ("comfy_table::", &["report"]),
+    ("quick_junit::", &["report"]),
     ("indicatif::", &["cli"]),
 ];
 

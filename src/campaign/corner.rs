@@ -61,6 +61,7 @@ pub fn adverse_sides(
         variants: vec![definition.variants[variant].clone()],
         modes: vec![definition.modes[mode].clone()],
         margins: None,
+        sensitivity: None,
         ..definition.clone()
     };
     let sampler = Sampler::new(dispersion, definition.seed);

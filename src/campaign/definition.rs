@@ -126,9 +126,32 @@ pub struct Definition {
     pub gimballed: Vec<bool>,
     /// Second-best to best overlap above which a case is followed by homotopy and both poles are stored.
     pub exchange_ratio: f64,
+    /// Where derivatives are stored, if anywhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensitivity: Option<SensitivityRule>,
     /// Loops to be assessed, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margins: Option<LoopPlan>,
+}
+
+/// The evaluations whose poles are stored with their derivatives.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SensitivityRule {
+    /// Indices of the variants.
+    pub variants: Vec<usize>,
+    /// Indices of the flight times.
+    pub flight_times: Vec<usize>,
+    /// Only the first cases of each population; all if not given.
+    pub cases: Option<u64>,
+}
+
+impl SensitivityRule {
+    /// Whether an evaluation is among them.
+    pub fn covers(&self, variant: usize, flight_time: usize, case: u64) -> bool {
+        self.cases.is_none_or(|cases| case < cases)
+            && self.variants.contains(&variant)
+            && self.flight_times.contains(&flight_time)
+    }
 }
 
 impl Definition {

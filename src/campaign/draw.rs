@@ -4,6 +4,8 @@
 //! impulse, ablation follows the unablated nozzle, damping coefficients follow the reference
 //! inertia. What the drawn numbers do to the motion is decided in `dynamics`.
 
+pub mod gradient;
+
 use super::draw_servo::{self, Target};
 use super::{Failure, FailureKind};
 use crate::dispersion::{Affine, Parameters, Place, Quantity};

@@ -37,7 +37,7 @@ pub fn actuators(
 
 /// K_a and C_a = 2 ζ √(J_ref K_nom) of a second-order actuator, the torque of any other, and the flex
 /// bearing where it is separate.
-fn drawn(
+pub fn drawn(
     nominal: &Actuator,
     [bearing_stiffness, bearing_damping]: [f64; 2],
     draw: &impl Fn(Quantity, f64) -> Result<f64, Failure>,
@@ -71,6 +71,30 @@ fn drawn(
         .state_space(),
     };
     Ok(DrawnActuator { stiffness_n_m_rad: separate, damping_n_m_s_rad: bearing_damping, torque })
+}
+
+/// The numbers of a torque law that are drawn, with their nominal values.
+pub fn numbers(law: &Law) -> Vec<(Quantity, f64)> {
+    match law {
+        Law::SecondOrder(law) => vec![
+            (Quantity::ActuatorStiffness, law.stiffness_n_m_rad),
+            (Quantity::ActuatorDamping, law.damping_ratio),
+        ],
+        Law::Electrohydraulic(law) => {
+            let numbers = std::cell::RefCell::new(Vec::new());
+            let note = |quantity, nominal| {
+                numbers.borrow_mut().push((quantity, nominal));
+                Ok(nominal)
+            };
+            let drawn = electrohydraulic(law, &note);
+            debug_assert!(drawn.is_ok());
+            numbers.into_inner()
+        }
+        Law::TransferFunction(TransferActuator { gain, time_scale, .. })
+        | Law::StateSpace(StateSpaceActuator { gain, time_scale, .. }) => {
+            vec![(Quantity::ActuatorGain, *gain), (Quantity::ActuatorTimeScale, *time_scale)]
+        }
+    }
 }
 
 fn electrohydraulic(

@@ -3,6 +3,7 @@
 //!
 //! It stores nothing and knows no files; `pool` runs it in parallel.
 
+use super::derivative::Place;
 use super::draw::Slots;
 use super::loops::{Loops, OpenLoop};
 use super::plant::Extent;
@@ -130,6 +131,17 @@ impl Buffers {
     }
 }
 
+/// A pole of a mode at chosen values, see [`Evaluator::follow`].
+#[derive(Debug, Clone)]
+pub struct Followed {
+    /// The pole as a record has it.
+    pub pole: Pole,
+    /// The pole with its vectors.
+    pub reference: Reference,
+    /// Its derivative by the independent score of every draw, rad/s; empty where not asked for.
+    pub by_score: Vec<Option<Complex<f64>>>,
+}
+
 /// One evaluation as it is made: the model and what was found in it.
 pub struct View<'a> {
     /// Plant of the evaluation.
@@ -150,6 +162,8 @@ pub struct Evaluator<'a> {
     /// Flight times, in the order of the definition.
     pub times: Vec<AtTime>,
     all_poles: bool,
+    /// Per parameter, whether a draw acts on it.
+    acts: Vec<bool>,
     workspaces: Mutex<Vec<Workspace<'a>>>,
 }
 
@@ -182,6 +196,7 @@ impl<'a> Evaluator<'a> {
             vehicle,
             times,
             all_poles,
+            acts: sampler.dispersion().acts(),
             workspaces: Mutex::new(Vec::new()),
         })
     }
@@ -196,6 +211,7 @@ impl<'a> Evaluator<'a> {
         let mut workspace = self.take();
         let Workspace { buffers: all_buffers, cursor, vehicle, poles } = &mut workspace;
         let draws = self.draws(cursor, population, case);
+        let fixed = &self.definition.populations[population].fixed;
         let mut evaluations = Vec::new();
         for (flight_time, at) in self.times.iter().enumerate() {
             let parameters = self.sampler.dispersion().parameters();
@@ -203,8 +219,13 @@ impl<'a> Evaluator<'a> {
             for variant in 0..at.variants.len() {
                 let plant = at.plant(variant);
                 let buffers = Buffers::of(all_buffers, plant.layout.coordinates());
-                let outcome =
-                    drawn.clone().and_then(|()| self.solve(at, variant, vehicle, buffers, poles));
+                let sensitive = self.definition.sensitivity.as_ref();
+                let sensitive =
+                    sensitive.is_some_and(|rule| rule.covers(variant, flight_time, case));
+                let place = self.place(at, variant, draws, fixed, vehicle);
+                let outcome = drawn
+                    .clone()
+                    .and_then(|()| self.solve(at, &place, (variant, sensitive), buffers, poles));
                 let null_poles = buffers.model.null_states.len();
                 let mut evaluation =
                     Evaluation { variant, flight_time, null_poles, outcome, loops: None };
@@ -273,7 +294,8 @@ impl<'a> Evaluator<'a> {
         at.slots.draw(self.vehicle, parameters, &draws.effects, vehicle)?;
         // The poles about which the grid is refined, as in the run.
         let closed = Buffers::of(buffers, at.plant(variant).layout.coordinates());
-        if self.solve(at, variant, vehicle, closed, poles).is_err() {
+        let place = self.place(at, variant, draws, &[], vehicle);
+        if self.solve(at, &place, (variant, false), closed, poles).is_err() {
             poles.clear();
         }
         let Buffers { model, solver, .. } = Buffers::of(buffers, open.coordinates());
@@ -287,6 +309,92 @@ impl<'a> Evaluator<'a> {
         at.plant(variant).assemble(&at.nominal, &at.variants[variant].effects, model);
     }
 
+    /// Where derivatives of a case are taken.
+    fn place<'p>(
+        &'p self,
+        at: &'p AtTime,
+        variant: usize,
+        draws: &'p Draws,
+        fixed: &'p [(usize, f64)],
+        drawn: &'p DrawnVehicle,
+    ) -> Place<'p> {
+        Place {
+            vehicle: self.vehicle,
+            dispersion: self.sampler.dispersion(),
+            acts: &self.acts,
+            slots: &at.slots,
+            plant: at.plant(variant),
+            effects: &at.variants[variant].effects,
+            draws,
+            fixed,
+            drawn,
+        }
+    }
+
+    /// The poles of a mode of interest (its index) with draws at `values` (index and value; all others
+    /// nominal), at a flight time and in a variant (indices of the definition): the primary one, and the
+    /// partner if there is one, each with its derivative by the independent score of every draw if asked
+    /// for. Values do not hold a key against its common score: all move with their scores.
+    ///
+    /// # Errors
+    /// As an evaluation fails.
+    pub fn follow(
+        &self,
+        values: &[(usize, f64)],
+        [flight_time, variant, mode]: [usize; 3],
+        derivatives: bool,
+    ) -> Result<Vec<Followed>, Failure> {
+        let mut workspace = self.take();
+        let Workspace { buffers, cursor, vehicle, poles } = &mut workspace;
+        let draws = cursor.draw(0, values, false);
+        let at = &self.times[flight_time];
+        let parameters = self.sampler.dispersion().parameters();
+        let drawn = at.slots.draw(self.vehicle, parameters, &draws.effects, vehicle);
+        let found = drawn.and_then(|()| {
+            let place = self.place(at, variant, draws, &[], vehicle);
+            let buffers = Buffers::of(buffers, place.plant.layout.coordinates());
+            place.plant.assemble(vehicle, place.effects, &mut buffers.model);
+            let solved = buffers.solver.poles(&buffers.model, poles);
+            solved.map_err(|error| Failure::from(&error))?;
+            let found = self.identify(at, variant, mode, buffers, poles)?;
+            let row = |(branch, candidate): (Branch, modal::Candidate)| {
+                let label = &at.labels[mode];
+                let pole = named_pole(place.plant, mode, branch, label, &candidate)?;
+                let reference = candidate.reference;
+                let by_score = if derivatives { place.by_score(&reference) } else { Vec::new() };
+                Ok(Followed { pole, reference, by_score })
+            };
+            found.into_iter().map(row).collect()
+        });
+        self.workspaces.lock().unwrap_or_else(PoisonError::into_inner).push(workspace);
+        found
+    }
+
+    /// The pole of a mode in the model of `buffers`, and its partner if there is one.
+    fn identify(
+        &self,
+        at: &AtTime,
+        variant: usize,
+        mode: usize,
+        buffers: &mut Buffers,
+        poles: &[Complex<f64>],
+    ) -> Result<Vec<(Branch, modal::Candidate)>, Failure> {
+        let Buffers { model, scratch, solver } = buffers;
+        let prepared = &at.variants[variant];
+        let identity = identify::identify(
+            solver,
+            &prepared.references[mode],
+            &prepared.nominal,
+            model,
+            poles,
+            self.definition.exchange_ratio,
+            scratch,
+        )
+        .map_err(|lost| self.lost(mode, lost))?;
+        let partner = identity.partner.map(|partner| (Branch::Partner, partner));
+        Ok(std::iter::once((Branch::Primary, identity.primary)).chain(partner).collect())
+    }
+
     fn take(&self) -> Workspace<'a> {
         let idle = self.workspaces.lock().unwrap_or_else(PoisonError::into_inner).pop();
         idle.unwrap_or_else(|| Workspace {
@@ -297,39 +405,36 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    /// Solves one variant of the drawn `vehicle`; its model stays in `buffers`.
+    /// Solves one variant of the drawn vehicle of `place`; its model stays in `buffers`.
     fn solve(
         &self,
         at: &AtTime,
-        variant: usize,
-        vehicle: &DrawnVehicle,
+        place: &Place<'_>,
+        (variant, sensitive): (usize, bool),
         buffers: &mut Buffers,
         poles: &mut Vec<Complex<f64>>,
     ) -> Result<Vec<Pole>, Failure> {
-        let Buffers { model, scratch, solver } = buffers;
-        let prepared = &at.variants[variant];
-        let plant = at.plant(variant);
-        plant.assemble(vehicle, &prepared.effects, model);
-        solver.poles(model, poles).map_err(|error| Failure::from(&error))?;
+        let plant = place.plant;
+        plant.assemble(place.drawn, place.effects, &mut buffers.model);
+        let solved = buffers.solver.poles(&buffers.model, poles);
+        solved.map_err(|error| Failure::from(&error))?;
         let mut rows = Vec::new();
-        for (mode, reference) in prepared.references.iter().enumerate() {
-            let identity = identify::identify(
-                solver,
-                reference,
-                &prepared.nominal,
-                model,
-                poles,
-                self.definition.exchange_ratio,
-                scratch,
-            )
-            .map_err(|lost| self.lost(mode, lost))?;
-            let branches =
-                [(Branch::Primary, Some(identity.primary)), (Branch::Partner, identity.partner)];
-            for (branch, found) in branches {
-                let Some(found) = found else { continue };
-                rows.push(named_pole(plant, mode, branch, &at.labels[mode], &found)?);
+        for mode in 0..at.labels.len() {
+            for (branch, found) in self.identify(at, variant, mode, buffers, poles)? {
+                let mut row = named_pole(plant, mode, branch, &at.labels[mode], &found)?;
+                if sensitive {
+                    let Buffers { model, solver, .. } = &mut *buffers;
+                    let near = nearest(poles, row.value).map(|near| {
+                        let pair = solver.pair(model, near);
+                        Reference::new(model, pair)
+                    });
+                    let sensitivity = place.sensitivity(&found.reference, near);
+                    row.sensitivity = Some(Box::new(sensitivity));
+                }
+                rows.push(row);
             }
         }
+        let Buffers { model, solver, .. } = buffers;
         if self.all_poles {
             let named: Vec<Complex<f64>> = rows.iter().map(|row: &Pole| row.value).collect();
             for &pole in poles.iter().filter(|pole| !named.contains(pole)) {
@@ -348,6 +453,17 @@ impl<'a> Evaluator<'a> {
             ),
         }
     }
+}
+
+/// Poles asked for the second-order change of another: more than one, since of a symmetric vehicle the
+/// nearest may be of the other symmetry and not coupled at all.
+const NEIGHBOURS: usize = 3;
+
+/// The other poles that are nearest to one of `poles`.
+fn nearest(poles: &[Complex<f64>], pole: Complex<f64>) -> impl Iterator<Item = Complex<f64>> {
+    let mut others: Vec<_> = poles.iter().copied().filter(|other| *other != pole).collect();
+    others.sort_by(|a, b| (a - pole).norm().total_cmp(&(b - pole).norm()));
+    others.into_iter().take(NEIGHBOURS)
 }
 
 /// The row of an identified pole.
@@ -373,6 +489,7 @@ fn named_pole(
         identity_confidence: Some(found.overlap.norm()),
         participation: Some(participation(plant, &found.reference)),
         residual: Some(pair.residual),
+        sensitivity: None,
     })
 }
 
@@ -395,6 +512,7 @@ fn other_pole(plant: &Plant, reference: &Reference) -> Pole {
         identity_confidence: None,
         participation: Some(participation(plant, reference)),
         residual: Some(reference.pair.residual),
+        sensitivity: None,
     }
 }
 

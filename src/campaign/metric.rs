@@ -290,6 +290,7 @@ mod tests {
             identity_confidence: None,
             participation: None,
             residual: None,
+            sensitivity: None,
         }
     }
 

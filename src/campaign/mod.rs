@@ -2,10 +2,12 @@
 
 pub mod corner;
 pub mod definition;
+pub mod derivative;
 pub mod draw;
 mod draw_servo;
 pub mod evaluator;
 pub mod feedback;
+pub mod influence;
 pub mod loop_metric;
 pub mod loops;
 pub mod metric;
@@ -22,8 +24,12 @@ pub mod statistics;
 pub mod summary;
 #[cfg(test)]
 pub mod synthetic;
+pub mod worst;
 
-pub use definition::{Definition, LoopPlan, NozzleJet, Population, Slope, Variant};
+pub use definition::{
+    Definition, LoopPlan, NozzleJet, Population, SensitivityRule, Slope, Variant,
+};
+pub use derivative::Sensitivity;
 pub use evaluator::Evaluator;
 pub use outline::{DrawColumn, Input, Outline, StoredPoles};
 pub use pool::{Pool, Progress, Span};

@@ -51,7 +51,21 @@ impl DrawColumn {
 
     /// Column of the normal score in the `cases` table: `z_…`.
     pub fn score_column(&self) -> String {
-        format!("z_{}", self.column.strip_prefix("draw_").unwrap_or(&self.column))
+        format!("z_{}", self.stem())
+    }
+
+    /// Column of the change of the damping ratio per σ in the `modes` table: `ddr_…`.
+    pub fn damping_column(&self) -> String {
+        format!("ddr_{}", self.stem())
+    }
+
+    /// Column of the change of the real part per σ in the `modes` table: `dre_…`.
+    pub fn real_column(&self) -> String {
+        format!("dre_{}", self.stem())
+    }
+
+    fn stem(&self) -> &str {
+        self.column.strip_prefix("draw_").unwrap_or(&self.column)
     }
 
     /// Position of `value` in the range of a bounded law: 0 at the low, 1 at the high end.

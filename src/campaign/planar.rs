@@ -125,6 +125,7 @@ impl PlanarCampaign {
             modes: vec!["least_damped".to_owned()],
             gimballed: vec![true],
             exchange_ratio: 0.5,
+            sensitivity: None,
             margins: None,
         };
         let draws = self.draws.iter().map(|(scatter, _)| scatter.column()).collect();
@@ -169,6 +170,7 @@ fn least_damped(parameters: Parameters) -> Result<Pole, Failure> {
         identity_confidence: None,
         participation: None,
         residual: None,
+        sensitivity: None,
     })
 }
 

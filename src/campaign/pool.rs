@@ -98,6 +98,11 @@ impl Pool {
         Ok(Self { threads })
     }
 
+    /// Runs `work` so that what it does in parallel is done on the threads of the pool.
+    pub fn install<T: Send>(&self, work: impl FnOnce() -> T + Send) -> T {
+        self.threads.install(work)
+    }
+
     /// Evaluates every case of `spans` and hands the records to `sink` in the order of `spans`.
     ///
     /// `evaluate` gets the population's index and the case index. A case that panics becomes a

@@ -2,6 +2,7 @@
 //!
 //! A record is a value; how it is stored is decided in `io`.
 
+use super::derivative::Sensitivity;
 use super::loops::Loops;
 use crate::dynamics::Part;
 use nalgebra::Complex;
@@ -116,6 +117,8 @@ pub struct Pole {
     pub participation: Option<[f64; Part::ALL.len()]>,
     /// Relative residual of the eigenpair, −; `None` where no vector was computed.
     pub residual: Option<f64>,
+    /// Derivatives, where the run stores them.
+    pub sensitivity: Option<Box<Sensitivity>>,
 }
 
 impl Pole {

@@ -41,6 +41,7 @@ pub fn definition(cases: &[u64]) -> Definition {
         modes: vec!["tvse".to_owned(), "bending".to_owned()],
         gimballed: vec![true, true],
         exchange_ratio: 0.5,
+        sensitivity: None,
         margins: None,
     }
 }
@@ -131,6 +132,7 @@ fn poles(
             identity_confidence: mode.map(|_| random.next()),
             participation: Some(std::array::from_fn(|_| random.next())),
             residual: mode.map(|_| 1e-15 * random.next()),
+            sensitivity: None,
         });
     };
     for mode in 0..definition.modes.len() {

@@ -1,9 +1,10 @@
 //! A campaign carried out: the options of every command that evaluates cases into a run's folder,
 //! and what they have in common.
 
+use super::gate::{self, Judged};
 use super::interrupt::Interrupt;
 use super::progress::{Show, Shown};
-use super::{Error, PASS, gate, part};
+use super::{Error, PASS, part};
 use crate::campaign::pool::{self, Part, Pool, Span};
 use crate::campaign::{Definition, Outline, Progress, Record};
 use crate::io::store::Access;
@@ -248,7 +249,7 @@ pub fn finish(
     results: Results,
     jobs: usize,
     title: &str,
-    gates: Option<&Path>,
+    gates: Option<Gates<'_>>,
     out: &mut dyn Write,
 ) -> Result<u8, Error> {
     let folder = results.store().folder().to_owned();
@@ -276,13 +277,18 @@ pub fn feedback(run: &Run) -> Result<String, Error> {
     Ok(report::feedback::text(run.outline(), &io::feedback::added(run)?))
 }
 
-fn end(run: &Run, gates: Option<&Path>, folder: &Path, out: &mut dyn Write) -> Result<u8, Error> {
+fn end(
+    run: &Run,
+    gates: Option<Gates<'_>>,
+    folder: &Path,
+    out: &mut dyn Write,
+) -> Result<u8, Error> {
     write!(out, "{}", feedback(run)?)?;
     for (table, content) in run.contents() {
         writeln!(out, "{}: {} rows", run.path(table).display(), content.rows)?;
     }
     match gates {
-        Some(gates) => gate::judge(run, gates, &folder.join("gates.json"), out),
+        Some((gates, outputs)) => gate::judge(run, &Judged { folder, gates, outputs }, out),
         None => Ok(PASS),
     }
 }
@@ -319,8 +325,11 @@ pub struct Campaign<'a> {
     /// First line of what is printed.
     pub title: &'a str,
     /// Gates.
-    pub gates: Option<&'a Path>,
+    pub gates: Option<Gates<'a>>,
 }
+
+/// The file of the gates and where their outcomes go.
+pub type Gates<'a> = (&'a Path, &'a gate::Outputs);
 
 /// Checks the gates of a campaign before its first case.
 ///

@@ -1,9 +1,10 @@
 //! `tvse compare`: paired differences between two finished runs on common draws.
 
+use super::gate::{self, Judged};
 use super::{Error, PASS, selection};
 use crate::campaign::{Sample, statistics};
-use crate::io::Run;
-use crate::problem::Problems;
+use crate::io::pair::{Common, Pair};
+use crate::io::{Run, files};
 use crate::report::statistics::lines;
 use std::path::PathBuf;
 
@@ -13,8 +14,9 @@ use std::path::PathBuf;
 /// have. Cases that failed in either are left out and counted.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Example:
-  tvse compare runs/all-engines runs/reference --metric damping_ratio_min_jet_damping_tvse")]
+Examples:
+  tvse compare runs/new runs/reference --metric damping_ratio_min_jet_damping_tvse
+  tvse compare runs/new runs/reference --gates runs/regression.gates.toml")]
 pub struct Args {
     /// Folder of the first run
     first: PathBuf,
@@ -30,10 +32,13 @@ pub struct Args {
     /// File for the numbers as CSV; it must not exist
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Gates to hold the first run against, with `baseline_run = true` where the difference counts; the exit
+    /// code is theirs (see `tvse gate`)
+    #[arg(long, value_name = "FILE")]
+    gates: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: gate::Outputs,
 }
-
-/// Draw columns read at once.
-const AT_ONCE: usize = 16;
 
 /// Runs the command.
 ///
@@ -46,9 +51,11 @@ pub fn run(args: &Args, out: &mut dyn std::io::Write) -> Result<u8, Error> {
     for run in &runs {
         places.push(selection::population(run, &args.population)?);
     }
-    let population = |i: usize| &runs[i].outline().definition.populations[places[i]];
-    let cases = common_cases(&args.first, &args.second, [population(0), population(1)])?;
-    let (keys, only) = common_draws(args, &runs, &places, cases)?;
+    let pair = Pair { run: &runs[0], baseline: &runs[1] };
+    let folders = [files::name(&args.first), files::name(&args.second)];
+    let Common { cases, keys, only } = pair.common(&args.population, [&folders[0], &folders[1]])?;
+    let cases = cases as usize;
+    let population = &runs[0].outline().definition.populations[places[0]];
     let mut names = selection::columns(&runs[0], &args.metric)?;
     let others = selection::columns(&runs[1], &[])?;
     if args.metric.is_empty() {
@@ -63,7 +70,7 @@ pub fn run(args: &Args, out: &mut dyn std::io::Write) -> Result<u8, Error> {
     }
     let first = selection::values(&runs[0], places[0], &names)?;
     let second = selection::values(&runs[1], places[1], &names)?;
-    let sample = Sample::of(population(0));
+    let sample = Sample::of(population);
     let mut all = Vec::new();
     for ((name, first), second) in names.iter().zip(&first).zip(&second) {
         let found = statistics::paired(sample, &first[..cases], &second[..cases]);
@@ -83,58 +90,11 @@ pub fn run(args: &Args, out: &mut dyn std::io::Write) -> Result<u8, Error> {
         writeln!(out, "no intervals: these cases are {}", sample.drawing().describe())?;
     }
     selection::write(args.output.as_deref(), &rows)?;
-    Ok(PASS)
-}
-
-/// Number of cases that both populations have in common.
-fn common_cases(
-    first: &std::path::Path,
-    second: &std::path::Path,
-    [a, b]: [&crate::campaign::Population; 2],
-) -> Result<usize, Error> {
-    let input = |found: String, allowed: &str| {
-        let file = format!("{} and {}", first.display(), second.display());
-        Err(Problems::input(file, &a.name, found, allowed).into())
-    };
-    if a.scheme != b.scheme || a.drawn != b.drawn {
-        let found = format!("{}, and {}", a.scheme.describe(), b.scheme.describe());
-        return input(found, "the same plan");
-    }
-    if a.cases != b.cases && !a.scheme.keeps_first_cases() {
-        let found = format!("{} and {} cases", a.cases, b.cases);
-        return input(found, "the same number: more cases change the first ones of this plan");
-    }
-    Ok(a.cases.min(b.cases) as usize)
-}
-
-/// Number of draw keys that both runs have, all with equal values, and of those that one has.
-fn common_draws(
-    args: &Args,
-    runs: &[Run; 2],
-    places: &[usize],
-    cases: usize,
-) -> Result<(usize, usize), Error> {
-    let draws = |i: usize| &runs[i].outline().draws;
-    let mut pairs = Vec::new();
-    for draw in draws(0) {
-        if let Some(other) = draws(1).iter().find(|other| other.key == draw.key) {
-            pairs.push((draw, other));
+    match &args.gates {
+        Some(gates) => {
+            let judged = Judged { folder: &args.first, gates, outputs: &args.outputs };
+            gate::judge_pair(&pair, &args.second, &judged, out)
         }
+        None => Ok(PASS),
     }
-    for pairs in pairs.chunks(AT_ONCE) {
-        let first: Vec<String> = pairs.iter().map(|(a, _)| a.column.clone()).collect();
-        let second: Vec<String> = pairs.iter().map(|(_, b)| b.column.clone()).collect();
-        let first = selection::values(&runs[0], places[0], &first)?;
-        let second = selection::values(&runs[1], places[1], &second)?;
-        for ((a, b), (draw, _)) in first.iter().zip(&second).zip(pairs) {
-            let differ = |i: &usize| a[*i].to_bits() != b[*i].to_bits();
-            if let Some(case) = (0..cases).find(differ) {
-                let file = format!("{} and {}", args.first.display(), args.second.display());
-                let found = format!("{} and {} in case {case}", a[case], b[case]);
-                let allowed = "the same draws: one seed, one plan, one law for each key";
-                return Err(Problems::input(file, &draw.key, found, allowed).into());
-            }
-        }
-    }
-    Ok((pairs.len(), draws(0).len() + draws(1).len() - 2 * pairs.len()))
 }

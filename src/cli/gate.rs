@@ -1,13 +1,18 @@
 //! `tvse gate`: holds a finished run against its gates.
 
 use super::Error;
-use crate::gate::{self, Gate, Names, Report};
-use crate::io::{Run, files};
-use crate::report;
+use crate::gate::{self, Gate, Names, Report, Source};
+use crate::io::pair::Pair;
+use crate::io::{Run, files, offenders};
+use crate::report::{annotations, gates as table, junit, markdown};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Gates on a finished run: a table with a verdict for each, and `gates.json` in the run's folder.
+///
+/// The cases that count against the gates go to `gate_offenders.parquet` beside it, each with the
+/// command that replays it. Where GITHUB_STEP_SUMMARY is set the outcomes are added to that file as
+/// Markdown, and with GITHUB_ACTIONS gates that do not pass are printed as annotations.
 ///
 /// Exit codes: 0 every gate passes, 1 one fails, 2 wrong usage or input, 3 incomplete data or
 /// nothing evaluated, 4 inconclusive: more cases are needed. A gate of severity `warning` is shown
@@ -16,6 +21,8 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "\
 Examples:
   tvse gate runs/reference --gates runs/reference.gates.toml
+  tvse gate runs/reference --gates runs/reference.gates.toml --junit gates.xml
+  tvse gate runs/new --gates runs/regression.gates.toml --baseline runs/reference
   tvse run runs/reference.toml --gates runs/reference.gates.toml")]
 pub struct Args {
     /// Folder of the run
@@ -23,19 +30,52 @@ pub struct Args {
     /// The gates
     #[arg(long, value_name = "FILE")]
     gates: PathBuf,
-    /// File for the outcomes (default: gates.json in the run's folder)
-    #[arg(long, value_name = "FILE")]
+    /// Run with the same draws, for gates with `baseline_run = true`
+    #[arg(long, value_name = "RUN")]
+    baseline: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: Outputs,
+}
+
+/// Where outcomes go beside the standard output.
+#[derive(Debug, Default, clap::Args)]
+pub struct Outputs {
+    /// File for the outcomes of the gates (default: gates.json in the run's folder)
+    #[arg(long, value_name = "FILE", requires = "gates")]
     json: Option<PathBuf>,
+    /// File for the outcomes of the gates as JUnit XML, one test case a gate
+    #[arg(long, value_name = "FILE", requires = "gates")]
+    junit: Option<PathBuf>,
+    /// File for the outcomes of the gates as Markdown
+    #[arg(long, value_name = "FILE", requires = "gates")]
+    markdown: Option<PathBuf>,
+}
+
+/// A run to be held against gates, and where the outcomes go.
+#[derive(Debug, Clone, Copy)]
+pub struct Judged<'a> {
+    /// Folder of the run.
+    pub folder: &'a Path,
+    /// File of the gates.
+    pub gates: &'a Path,
+    /// Where the outcomes go.
+    pub outputs: &'a Outputs,
 }
 
 /// Runs the command.
 ///
 /// # Errors
-/// No such run, damaged tables, or all problems of the gate file.
+/// No such run, damaged tables, a baseline with other draws, or all problems of the gate file.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let run = Run::open(&args.run)?;
-    let json = args.json.clone().unwrap_or_else(|| args.run.join("gates.json"));
-    judge(&run, &args.gates, &json, out)
+    let judged = Judged { folder: &args.run, gates: &args.gates, outputs: &args.outputs };
+    match &args.baseline {
+        None => judge(&run, &judged, out),
+        Some(folder) => {
+            let baseline = Run::open(folder)?;
+            judge_pair(&Pair { run: &run, baseline: &baseline }, folder, &judged, out)
+        }
+    }
 }
 
 /// The gates of a file, checked against what the run has, and the file's name.
@@ -49,15 +89,57 @@ pub fn rules(path: &Path, run: &impl Names) -> Result<(Vec<Gate>, String), Error
     Ok((rules, name))
 }
 
-/// Evaluates the gates of the file `gates` on `run`, prints them and writes `json`; gives the exit
-/// code.
+/// As [`judge`], for a run and the `baseline` in another folder.
+///
+/// # Errors
+/// As [`judge`], and runs whose draws are not common.
+pub fn judge_pair(
+    pair: &Pair<'_>,
+    baseline: &Path,
+    judged: &Judged<'_>,
+    out: &mut dyn Write,
+) -> Result<u8, Error> {
+    let (rules, _) = rules(judged.gates, pair)?;
+    let selections = rules.iter().map(|gate| &gate.selection).filter(|s| s.baseline_run);
+    let mut populations: Vec<&str> = selections.map(|s| s.population.as_str()).collect();
+    populations.sort_unstable();
+    populations.dedup();
+    for population in populations {
+        pair.common(population, [&files::name(judged.folder), &files::name(baseline)])?;
+    }
+    judge(pair, judged, out)
+}
+
+/// Evaluates gates on a run, prints them, stores what they found and gives the exit code.
 ///
 /// # Errors
 /// All problems of the gate file, damaged tables, or a file that cannot be written.
-pub fn judge(run: &Run, gates: &Path, json: &Path, out: &mut dyn Write) -> Result<u8, Error> {
-    let (rules, name) = rules(gates, run)?;
-    let report = Report::new(gate::evaluate(&rules, run, &name)?);
-    files::write(json, report.to_json().as_bytes())?;
-    writeln!(out, "{}{}", report::gates::gates(&report), json.display())?;
+pub fn judge(source: &impl Source, judged: &Judged<'_>, out: &mut dyn Write) -> Result<u8, Error> {
+    let (rules, name) = rules(judged.gates, source)?;
+    let report = Report::new(gate::evaluate(&rules, source, &name)?);
+    let folder = files::name(judged.folder);
+    let outputs = judged.outputs;
+    let json = outputs.json.clone().unwrap_or_else(|| judged.folder.join("gates.json"));
+    let rows = judged.folder.join(offenders::FILE);
+    files::write(&json, report.to_json().as_bytes())?;
+    offenders::write(&report, &folder, &rows)?;
+    write!(out, "{}", table::gates(&report, &folder))?;
+    for path in [&json, &rows] {
+        writeln!(out, "{}", path.display())?;
+    }
+    if let Some(path) = &outputs.junit {
+        files::write(path, junit::text(&report, &folder).as_bytes())?;
+    }
+    let markdown = markdown::text(&report, &folder);
+    if let Some(path) = &outputs.markdown {
+        files::write(path, markdown.as_bytes())?;
+    }
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+    if let Some(path) = set("GITHUB_STEP_SUMMARY") {
+        files::append(Path::new(&path), &markdown::cut(&markdown))?;
+    }
+    if set("GITHUB_ACTIONS").is_some() {
+        write!(out, "{}", annotations::text(&report, &folder, &name))?;
+    }
     Ok(report.exit_code)
 }

@@ -24,6 +24,8 @@ pub struct Args {
     /// Gates to hold the results against; the exit code is theirs (see `tvse gate`)
     #[arg(long, value_name = "FILE")]
     gates: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: super::gate::Outputs,
 }
 
 /// Runs the command.
@@ -47,5 +49,6 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         return Ok(INCOMPLETE);
     }
     let title = format!("merged on {}", maker::instruction_set());
-    campaign::finish(Results::of(store), 1, &title, args.gates.as_deref(), out)
+    let gates = args.gates.as_deref().map(|gates| (gates, &args.outputs));
+    campaign::finish(Results::of(store), 1, &title, gates, out)
 }

@@ -12,6 +12,7 @@ pub mod error;
 pub mod gate;
 pub mod how_many;
 pub mod import;
+pub mod influence;
 pub mod init;
 pub mod interrupt;
 pub mod margins;
@@ -35,6 +36,7 @@ pub mod statistics;
 pub mod status;
 pub mod submit;
 pub mod summary;
+pub mod worst;
 
 pub use error::Error;
 
@@ -83,6 +85,8 @@ enum Command {
     Compare(compare::Args),
     Gate(gate::Args),
     Replay(replay::Args),
+    Worst(worst::Args),
+    Influence(influence::Args),
     Response(response::Args),
     HowMany(how_many::Args),
     Planar(planar::Args),
@@ -161,6 +165,8 @@ pub fn run() -> ExitCode {
         Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
+        Command::Worst(args) => worst::run(args, &mut out),
+        Command::Influence(args) => influence::run(args, &mut out),
         Command::Response(args) => response::run(args, &mut out),
         Command::HowMany(args) => how_many::run(args, &mut out),
         Command::Planar(args) => planar::run(args, &mut out),

@@ -97,6 +97,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         flight_times_s: vec![args.time],
         variants: vec![definition.variants[variant].clone()],
         modes: Vec::new(),
+        sensitivity: None,
         ..definition
     };
     let sampler = Sampler::new(&loaded.dispersion, definition.seed);

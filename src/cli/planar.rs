@@ -92,6 +92,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE", requires = "cases")]
     gates: Option<PathBuf>,
     #[command(flatten)]
+    outputs: super::gate::Outputs,
+    #[command(flatten)]
     options: Options,
 }
 
@@ -169,7 +171,8 @@ fn run_campaign(
     let outline = pair.outline(args.seed, cases, inputs.digests());
     campaign::check_gates(args.gates.as_deref(), &outline)?;
     let results = Results::open(folder, outline, Some(&inputs), opening, access)?;
-    let campaign = Campaign { access, title: "planar pair", gates: args.gates.as_deref() };
+    let gates = args.gates.as_deref().map(|gates| (gates, &args.outputs));
+    let campaign = Campaign { access, title: "planar pair", gates };
     let case = |population, case| pair.evaluate(population, case);
     campaign::carry_out(&campaign, &args.options, (&pool, jobs), &interrupt, results, case, out)
 }

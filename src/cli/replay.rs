@@ -16,14 +16,24 @@ use std::path::{Path, PathBuf};
 /// compares draws and poles with the stored rows bit for bit. Exit code 1 if they differ.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Example:
-  tvse replay runs/reference --case 17")]
+Examples:
+  tvse replay runs/reference --case 17
+  tvse replay runs/reference --worst jet_damping_tvse_box")]
 pub struct Args {
     /// Folder of the run
     run: PathBuf,
     /// Case index inside its population
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "N",
+        allow_negative_numbers = true,
+        required_unless_present = "worst",
+        default_value_if("worst", clap::builder::ArgPredicate::IsPresent, "0")
+    )]
     case: u64,
+    /// Name of a case that `tvse worst` found, instead
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["case", "population"])]
+    worst: Option<String>,
     /// Population of the case
     #[arg(long, value_name = "NAME", default_value = "dispersed")]
     population: String,
@@ -44,6 +54,11 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let stored = Run::open(&args.run)?;
     let outline = stored.outline();
     let definition = &outline.definition;
+    if let Some(name) = &args.worst {
+        let loaded = inputs::read(&args.run, &outline.inputs)?;
+        let target = (args.output.as_deref(), args.force);
+        return super::worst::replay(&args.run, name, (&stored, &loaded), target, out);
+    }
     let names = || definition.populations.iter().map(|p| p.name.as_str());
     let Some(population) = names().position(|name| name == args.population) else {
         let allowed = allowed_instead(&args.population, names());

@@ -42,6 +42,8 @@ pub struct Args {
     /// Gates to hold the results against; the exit code is theirs (see `tvse gate`)
     #[arg(long, value_name = "FILE")]
     gates: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: super::gate::Outputs,
     /// Poles stored in the `modes` table
     #[arg(long, value_enum, default_value_t = Poles::Named)]
     poles: Poles,
@@ -100,7 +102,8 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let sampler = loaded.sampler(&definition)?;
     let evaluator = Evaluator::new(vehicle, &sampler, &definition, poles == StoredPoles::All)
         .map_err(|error| unprepared(&args.run, &error))?;
-    let campaign = Campaign { access, title: &vehicle.name, gates: args.gates.as_deref() };
+    let gates = args.gates.as_deref().map(|gates| (gates, &args.outputs));
+    let campaign = Campaign { access, title: &vehicle.name, gates };
     let case = |population, case| evaluator.evaluate(population, case);
     campaign::carry_out(&campaign, &args.options, (&pool, jobs), &interrupt, results, case, out)
 }

@@ -29,6 +29,11 @@ impl Beta {
         (beta_reg(self.alpha, self.beta, t), beta_reg(self.beta, self.alpha, rest))
     }
 
+    /// The density at `t`, where `rest` is 1 − t.
+    pub fn density(&self, t: f64, rest: f64) -> f64 {
+        ((self.alpha - 1.0) * t.ln() + (self.beta - 1.0) * rest.ln() - self.ln_beta).exp()
+    }
+
     /// The t with probability `below` beneath and `above` over it, and 1 − t.
     pub fn quantile(&self, below: f64, above: f64) -> (f64, f64) {
         if self.alpha == self.beta && below == above {

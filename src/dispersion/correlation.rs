@@ -3,6 +3,7 @@
 //! A group of draws has the normal scores z = L w with independent standard normal w and L Lᵀ the
 //! matrix; margins are untouched. Which draws form a group is read in `resolve`.
 
+use nalgebra::Complex;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::f64::consts::PI;
@@ -84,6 +85,27 @@ impl Group {
         for (score, row) in scores.iter_mut().zip(&self.factor) {
             *score = row.iter().zip(independent).map(|(l, w)| l * w).sum();
         }
+    }
+
+    /// Independent scores of which correlated ones are made, the inverse of [`Group::correlate`].
+    pub fn independent(&self, scores: &[f64]) -> Vec<f64> {
+        let mut found: Vec<f64> = Vec::with_capacity(scores.len());
+        for (i, (score, row)) in scores.iter().zip(&self.factor).enumerate() {
+            let before: f64 = row.iter().zip(&found).map(|(l, w)| l * w).sum();
+            found.push((score - before) / row[i]);
+        }
+        found
+    }
+
+    /// A gradient by the independent scores from that by the correlated ones, Lᵀ times it.
+    pub fn pull(&self, by_score: &[Complex<f64>]) -> Vec<Complex<f64>> {
+        let mut found = vec![Complex::ZERO; by_score.len()];
+        for (by, row) in by_score.iter().zip(&self.factor) {
+            for (found, l) in found.iter_mut().zip(row) {
+                *found += by * *l;
+            }
+        }
+        found
     }
 
     /// Correlation of the normal scores of two members, by their places.

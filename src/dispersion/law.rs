@@ -377,6 +377,42 @@ impl Law {
         }
     }
 
+    /// How fast the value follows the normal score, dx/dz = φ(z)/f(x) for the density f, at a place of
+    /// the distribution; zero for a fixed law, `None` for a discrete one, which jumps.
+    pub fn slope(&self, at: &Position) -> Option<f64> {
+        let Position { below, above, score } = *at;
+        let phi = normal::density(score);
+        let slope = match &self.0 {
+            Shape::Fixed { .. } => 0.0,
+            Shape::Normal { sigma, .. } => *sigma,
+            Shape::TruncatedNormal { sigma, law, .. } => {
+                sigma * law.slope(law.score(below, above), score)
+            }
+            Shape::Uniform { low, high } => (high - low) * phi,
+            Shape::Triangular { low, mode, high } => {
+                let (x, width) = (self.value(at), high - low);
+                if x <= *mode && mode > low {
+                    phi * width * (mode - low) / (2.0 * (x - low))
+                } else {
+                    phi * width * (high - mode) / (2.0 * (high - x))
+                }
+            }
+            Shape::Lognormal { sigma_ln, .. } => self.value(at) * sigma_ln,
+            Shape::Beta { shape, low, high } => {
+                let (t, rest) = shape.quantile(below, above);
+                phi * (high - low) / shape.density(t, rest)
+            }
+            Shape::Discrete { .. } => return None,
+            Shape::Empirical { probabilities, values } => {
+                let upper =
+                    probabilities.partition_point(|&p| p < below).clamp(1, values.len() - 1);
+                let (p, v) = (&probabilities[upper - 1..=upper], &values[upper - 1..=upper]);
+                phi * (v[1] - v[0]) / (p[1] - p[0])
+            }
+        };
+        Some(slope).filter(|slope| slope.is_finite())
+    }
+
     /// F(x), the probability of a value up to and including `x`.
     pub fn cdf(&self, x: f64) -> f64 {
         self.tails(x).0

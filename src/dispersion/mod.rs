@@ -11,6 +11,7 @@ pub mod draw;
 pub mod factorial;
 #[cfg(test)]
 pub(crate) mod fixture;
+pub mod gradient;
 pub mod keyed;
 pub mod law;
 pub mod normal;
@@ -26,6 +27,7 @@ pub mod table;
 
 pub use correlation::Group;
 pub use draw::{Dispersion, Draw, Role, Shared};
+pub use gradient::AffineGradient;
 pub use law::{Bound, Law, Position};
 pub use parameter::{Affine, Parameters, Place, Quantity};
 pub use plan::{Listed, Plan};

@@ -6,7 +6,7 @@ use libm::{erf, erfc};
 // The inverses of `statrs` are good to the last digits; its erf and erfc are not used, since their
 // rational approximations carry constants cut to ten digits.
 use statrs::function::erf::{erf_inv, erfc_inv};
-use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_SQRT_PI, SQRT_2};
 
 /// Φ(z), the probability below `z`; relative error below 1e-14 down to the smallest normal
 /// number (z ≈ −37.5).
@@ -28,6 +28,11 @@ pub fn above(z: f64) -> f64 {
     let value = 0.5 * erfc(t);
     // An infinite z has no correction; and below 1 erfc is not of that form, nor does it matter.
     if z > 1.0 && correction.is_finite() { value + value * correction } else { value }
+}
+
+/// φ(z), the density.
+pub fn density(z: f64) -> f64 {
+    FRAC_1_SQRT_2 * 0.5 * FRAC_2_SQRT_PI * (-0.5 * z * z).exp()
 }
 
 /// Φ(b) − Φ(a) for a ≤ b, without cancellation where the two lie on different sides of zero or
@@ -86,6 +91,12 @@ impl Truncated {
         };
         // Rounding of the last digit must not step over a bound; no probability is moved.
         z.clamp(self.scores[0], self.scores[1])
+    }
+
+    /// φ(z)/φ(t) times the probability inside, for the score t at which the law stands where a whole
+    /// normal law stands at `z`: how fast t follows z.
+    pub fn slope(&self, t: f64, z: f64) -> f64 {
+        (0.5 * (t - z) * (t + z)).exp() * between(self.scores[0], self.scores[1])
     }
 
     /// The shares of the law's probability beneath and above the score `z`.

@@ -5,6 +5,7 @@
 //! `vehicle::aerodynamics`.
 
 use super::drawn::DrawnAerodynamics;
+use super::gradient::{C, C3, Vectors, complex};
 use super::{Layout, Model};
 use nalgebra::Vector3;
 
@@ -85,5 +86,81 @@ impl AerodynamicPlant {
         for (angle, coefficient) in rotation.zip(coefficients) {
             model.damping[(angle, angle)] -= damping * coefficient;
         }
+    }
+    /// The part of the aerodynamics in the form of [`super::gradient`], and its gradient with the mean
+    /// acceleration held.
+    pub fn form(
+        &self,
+        drawn: &DrawnAerodynamics,
+        factor: f64,
+        layout: &Layout,
+        vectors: &Vectors<'_>,
+    ) -> (C, AerodynamicGradient) {
+        let (s, left, right) = (vectors.s, vectors.left, vectors.right);
+        let pressure = factor * drawn.dynamic_pressure_pa;
+        let mut to = AerodynamicGradient::default();
+        // Everything is in proportion to the pressure.
+        let mut per_pressure = C::new(0.0, 0.0);
+        for entry in &self.entries {
+            let product = left[entry.row] * right[entry.column];
+            per_pressure -= product * (s * entry.damping + entry.stiffness);
+        }
+        let (translation, rotation) = (layout.translation(), layout.rotation());
+        if !rotation.is_empty() {
+            let arm = drawn.center_of_pressure_x_m - self.reference_m.x;
+            let slope = self.area_m2 * drawn.normal_force_slope_1_rad;
+            for (axis, turn, sign) in [(1, 2, 1.0), (2, 1, -1.0)] {
+                let (force, angle) = (translation.start + axis, rotation.start + turn);
+                let felt = left[force] + left[angle] * (sign * arm);
+                let rate = s / self.speed_m_s;
+                let flow =
+                    right[angle] * sign + rate * (right[force] + right[angle] * (sign * arm));
+                let product = felt * flow;
+                per_pressure += product * slope;
+                to.normal_force_slope_1_rad += product * (pressure * self.area_m2);
+                let by_arm = left[angle] * flow + felt * rate * right[angle];
+                to.center_of_pressure_x_m += by_arm * (pressure * slope * sign);
+            }
+            let part = |z: &[C], range: &std::ops::Range<usize>| {
+                C3::new(z[range.start], z[range.start + 1], z[range.start + 2])
+            };
+            let (xi, theta) = (part(left, &translation), part(right, &rotation));
+            let axial = xi.dot(&complex(&Vector3::x()).cross(&theta));
+            per_pressure += axial * (self.area_m2 * drawn.axial_force);
+            to.axial_force = axial * (pressure * self.area_m2);
+            let damping = self.area_m2 * self.length_m * self.length_m / (2.0 * self.speed_m_s);
+            let [roll, pitch, yaw] =
+                [0, 1, 2].map(|axis| vectors.product(rotation.start + axis) * s * damping);
+            per_pressure -= roll * drawn.roll_damping + (pitch + yaw) * drawn.pitch_damping;
+            to.roll_damping = -roll * pressure;
+            to.pitch_damping = -(pitch + yaw) * pressure;
+        }
+        to.dynamic_pressure_pa = per_pressure * factor;
+        (per_pressure * pressure, to)
+    }
+}
+
+/// Gradient by the numbers of the same names in [`DrawnAerodynamics`].
+#[derive(Debug, Clone, Copy, Default)]
+pub struct AerodynamicGradient {
+    /// By the dynamic pressure.
+    pub dynamic_pressure_pa: C,
+    /// By the slope of the normal force coefficient.
+    pub normal_force_slope_1_rad: C,
+    /// By the station of the centre of pressure.
+    pub center_of_pressure_x_m: C,
+    /// By the axial force coefficient.
+    pub axial_force: C,
+    /// By the damping coefficient in pitch and yaw.
+    pub pitch_damping: C,
+    /// By the damping coefficient in roll.
+    pub roll_damping: C,
+}
+
+impl AerodynamicGradient {
+    /// Adds what pressure and axial force do through the drag, by which the gradient is `by_drag`.
+    pub fn add_drag(&mut self, plant: &AerodynamicPlant, drawn: &DrawnAerodynamics, by_drag: C) {
+        self.dynamic_pressure_pa += by_drag * (plant.area_m2 * drawn.axial_force);
+        self.axial_force += by_drag * (drawn.dynamic_pressure_pa * plant.area_m2);
     }
 }

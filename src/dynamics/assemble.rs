@@ -78,9 +78,19 @@ impl Plant {
     /// m/s².
     pub fn mean_acceleration(&self, drawn: &DrawnVehicle, effects: &Effects) -> Vector3<f64> {
         let mut force = Vector3::zeros();
-        let mut mass = self.body.mass_kg;
         for (attachment, engine) in self.attachments.iter().zip(&drawn.engines) {
             force += attachment.thrust_direction * (effects.thrust * engine.thrust_n);
+        }
+        if let (Some(plant), Some(air)) = (&self.aerodynamics, &drawn.aerodynamics) {
+            force.x += effects.aerodynamics * plant.drag_n(air);
+        }
+        force / self.total_mass_kg(drawn)
+    }
+
+    /// Mass of the body and all that is attached to it, kg.
+    pub(super) fn total_mass_kg(&self, drawn: &DrawnVehicle) -> f64 {
+        let mut mass = self.body.mass_kg;
+        for (attachment, engine) in self.attachments.iter().zip(&drawn.engines) {
             if !attachment.in_modes {
                 mass += engine.mass_kg;
             }
@@ -90,10 +100,7 @@ impl Plant {
                 mass += tank.mass_kg;
             }
         }
-        if let (Some(plant), Some(air)) = (&self.aerodynamics, &drawn.aerodynamics) {
-            force.x += effects.aerodynamics * plant.drag_n(air);
-        }
-        force / mass
+        mass
     }
 
     /// The directions of the flows that damp under `effects`: a case's along x, a nozzle's its own.

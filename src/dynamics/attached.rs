@@ -3,6 +3,7 @@
 //!
 //! Inertia and forces of an engine or a slosh mass are added in `engine` and `slosh`.
 
+use super::gradient::{C, C3};
 use super::{Layout, Model};
 use nalgebra::Vector3;
 use std::ops::Range;
@@ -39,6 +40,15 @@ impl Columns {
             Some(first) if local >= self.body => first + local - self.body,
             _ => local,
         }
+    }
+
+    /// The rigid rotation in a vector; zero where the rigid body is held.
+    pub fn rotation_of(&self, z: &[C]) -> C3 {
+        let first = self.rotation.start;
+        if self.rotation.is_empty() {
+            return C3::zeros();
+        }
+        C3::new(z[first], z[first + 1], z[first + 2])
     }
 
     /// Adds the acceleration stiffness between the rigid rotation and every column but the rigid

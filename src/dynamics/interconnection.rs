@@ -6,7 +6,7 @@
 
 use crate::spelling::allowed_instead;
 use crate::vehicle::StateSpace;
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 use std::ops::Range;
 
 /// Names of a block's ports and states.
@@ -52,6 +52,59 @@ const LARGEST_CONDITION: f64 = 6.7e7; // 1/√ε
 struct Tap {
     outputs: Vec<usize>,
     external: Option<usize>,
+}
+
+/// What [`Interconnection::local`] finds.
+#[derive(Debug, Clone)]
+pub struct Local {
+    /// The form.
+    pub value: Complex<f64>,
+    /// What each block sees and what weighs there.
+    pub members: Vec<Member>,
+    /// Gradient by the external inputs.
+    pub by_external: Vec<Complex<f64>>,
+}
+
+/// One block in a motion.
+#[derive(Debug, Clone)]
+pub struct Member {
+    /// Its inputs u.
+    input: Vec<Complex<f64>>,
+    /// Its states x.
+    state: Vec<Complex<f64>>,
+    /// Weight of each output.
+    output_weight: Vec<Complex<f64>>,
+    /// Weight of the rate of each state.
+    state_weight: Vec<Complex<f64>>,
+}
+
+impl Member {
+    /// `outputᵀ (D u + C x) + weightᵀ (B u + A x)`: what the form has of the block with the matrices of
+    /// `block`, linear in them.
+    ///
+    /// # Panics
+    /// If `block` is of another size.
+    pub fn part(&self, block: &StateSpace) -> Complex<f64> {
+        let outputs = bilinear(&self.output_weight, &block.d, &self.input)
+            + bilinear(&self.output_weight, &block.c, &self.state);
+        outputs + self.rates(block)
+    }
+
+    fn rates(&self, block: &StateSpace) -> Complex<f64> {
+        bilinear(&self.state_weight, &block.b, &self.input)
+            + bilinear(&self.state_weight, &block.a, &self.state)
+    }
+}
+
+/// `wᵀ M z`.
+fn bilinear(w: &[Complex<f64>], matrix: &DMatrix<f64>, z: &[Complex<f64>]) -> Complex<f64> {
+    assert_eq!(matrix.shape(), (w.len(), z.len()), "a block of this size");
+    let mut sum = Complex::ZERO;
+    for (column, z) in z.iter().enumerate() {
+        let rows = w.iter().enumerate();
+        sum += rows.map(|(row, w)| w * matrix[(row, column)]).sum::<Complex<f64>>() * z;
+    }
+    sum
 }
 
 /// Blocks whose ports are connected.
@@ -184,6 +237,85 @@ impl Interconnection {
             }
         }
         Ok(StateSpace { a, b, c, d })
+    }
+
+    /// What each block sees of a motion with given states and external inputs, and what weighs there: for
+    /// the form `Σ w_y y + Σ w_x ẋ` of outputs of the whole and rates of states, df is
+    /// `outputᵀ (dD u + dC x) + weightᵀ (dB u + dA x)` for a change of a block's matrices.
+    ///
+    /// # Errors
+    /// As [`Interconnection::compose`].
+    ///
+    /// # Panics
+    /// If the blocks or the vectors do not have the sizes of their names.
+    pub fn local(
+        &self,
+        blocks: &[StateSpace],
+        [states, external]: [&[Complex<f64>]; 2],
+        [output_weights, state_weights]: [&[Complex<f64>]; 2],
+    ) -> Result<Local, AlgebraicLoop> {
+        let (through, direct) = self.direct(blocks);
+        // Real and imaginary part as two columns.
+        let known: Vec<Complex<f64>> = states.iter().chain(external).copied().collect();
+        let pair = |z: &Complex<f64>, column: usize| if column == 0 { z.re } else { z.im };
+        let mut y = direct * DMatrix::from_fn(known.len(), 2, |i, j| pair(&known[i], j));
+        self.solve(&through, &mut y)?;
+        let output = |source: usize| Complex::new(y[(source, 0)], y[(source, 1)]);
+        let input = |tap: &Tap| {
+            let outputs = tap.outputs.iter().map(|&source| output(source));
+            outputs.sum::<Complex<f64>>() + tap.external.map_or(Complex::ZERO, |e| external[e])
+        };
+        let inputs: Vec<Complex<f64>> = self.reads.iter().map(input).collect();
+        let value: Complex<f64> =
+            self.gives.iter().zip(output_weights).map(|(tap, weight)| input(tap) * weight).sum();
+
+        // Backwards: ŷ = Kᵀ (Dᵀ ŷ + Bᵀ w_x) + w_y.
+        let mut adjoint = DMatrix::zeros(self.ports.len(), 2);
+        let mut by_external = vec![Complex::ZERO; external.len()];
+        let mut give = |tap: &Tap, weight: Complex<f64>, to: &mut DMatrix<f64>| {
+            for &source in &tap.outputs {
+                to[(source, 0)] += weight.re;
+                to[(source, 1)] += weight.im;
+            }
+            if let Some(external) = tap.external {
+                by_external[external] += weight;
+            }
+        };
+        for (tap, weight) in self.gives.iter().zip(output_weights) {
+            give(tap, *weight, &mut adjoint);
+        }
+        let through_states = |block: &StateSpace, xs: &Range<usize>, input: usize| {
+            let weights = state_weights[xs.clone()].iter().enumerate();
+            weights.map(|(state, w)| w * block.b[(state, input)]).sum::<Complex<f64>>()
+        };
+        for (block, [xs, us, _]) in blocks.iter().zip(&self.ranges) {
+            for (input, tap) in self.reads[us.clone()].iter().enumerate() {
+                give(tap, through_states(block, xs, input), &mut adjoint);
+            }
+        }
+        self.solve(&through.transpose(), &mut adjoint)?;
+        let weight = |port: usize| Complex::new(adjoint[(port, 0)], adjoint[(port, 1)]);
+        let mut rates = Complex::ZERO;
+        let mut members = Vec::new();
+        for (block, [xs, us, ys]) in blocks.iter().zip(&self.ranges) {
+            let member = Member {
+                input: inputs[us.clone()].to_vec(),
+                state: states[xs.clone()].to_vec(),
+                output_weight: ys.clone().map(weight).collect(),
+                state_weight: state_weights[xs.clone()].to_vec(),
+            };
+            rates += member.rates(block);
+            // The share of external inputs that goes straight through a block.
+            for (input, tap) in self.reads[us.clone()].iter().enumerate() {
+                if let Some(external) = tap.external {
+                    let outputs = member.output_weight.iter().enumerate();
+                    by_external[external] +=
+                        outputs.map(|(o, w)| w * block.d[(o, input)]).sum::<Complex<f64>>();
+                }
+            }
+            members.push(member);
+        }
+        Ok(Local { value: value + rates, members, by_external })
     }
 
     /// Output ports of `blocks` that depend on themselves without a state between, as `block: signal`.

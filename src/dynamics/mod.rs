@@ -23,6 +23,7 @@ pub mod attached;
 pub mod control_law;
 pub mod drawn;
 pub mod engine;
+pub mod gradient;
 pub mod interconnection;
 pub mod jet_damping;
 pub mod layout;
@@ -41,6 +42,7 @@ pub use drawn::{
     DrawnSensor, DrawnTank, DrawnVehicle,
 };
 pub use engine::Attachment;
+pub use gradient::{Gradient, Vectors};
 pub use layout::{Layout, Part};
 pub use model::{Model, NullMotion};
 pub use servo::{Feedback, Servo};

@@ -5,9 +5,16 @@
 //! that accelerates along its turned thrust, `ξ̈ = −g0 × θ`, is in equilibrium; so θ acts on ξ alone and
 //! is null as well, and its rate too unless flow or air damps it.
 
+use super::gradient::{C, Vectors};
 use super::{DrawnBody, Layout, Model, NullMotion};
 use crate::vehicle::MassProperties;
 use nalgebra::{Matrix3, Vector3};
+
+/// Inertia of the body as drawn, kg·m².
+fn inertia(body: &MassProperties, drawn: &DrawnBody) -> Matrix3<f64> {
+    let gain = Matrix3::from_diagonal(&drawn.inertia_gain.map(f64::sqrt).into());
+    gain * body.inertia_kg_m2 * gain
+}
 
 /// Adds mass and inertia of the body about its cg, roll, pitch and yaw inertia scaled as drawn
 /// (products of inertia by the geometric mean, so that the tensor stays positive definite).
@@ -15,13 +22,38 @@ pub fn add(body: &MassProperties, drawn: &DrawnBody, layout: &Layout, model: &mu
     for at in layout.translation() {
         model.mass[(at, at)] += body.mass_kg;
     }
-    let gain = Matrix3::from_diagonal(&drawn.inertia_gain.map(f64::sqrt).into());
-    let inertia = gain * body.inertia_kg_m2 * gain;
+    let inertia = inertia(body, drawn);
     for (row, a) in layout.rotation().enumerate() {
         for (column, b) in layout.rotation().enumerate() {
             model.mass[(a, b)] += inertia[(row, column)];
         }
     }
+}
+
+/// The part of the body's mass and inertia in the form of [`super::gradient`], and its gradient by the
+/// inertia gains.
+pub fn form(
+    body: &MassProperties,
+    drawn: &DrawnBody,
+    layout: &Layout,
+    vectors: &Vectors<'_>,
+) -> (C, [C; 3]) {
+    let square = vectors.s * vectors.s;
+    let translation = layout.translation().map(|at| vectors.product(at) * body.mass_kg);
+    let mut value = translation.sum::<C>() * square;
+    let mut gradient = [C::new(0.0, 0.0); 3];
+    let inertia = inertia(body, drawn);
+    for (row, a) in layout.rotation().enumerate() {
+        for (column, b) in layout.rotation().enumerate() {
+            let part = square * vectors.left[a] * vectors.right[b] * inertia[(row, column)];
+            value += part;
+            // √(g_row g_column), so that each gain has half of the part.
+            for axis in [row, column] {
+                gradient[axis] += part * (0.5 / drawn.inertia_gain[axis]);
+            }
+        }
+    }
+    (value, gradient)
 }
 
 /// Directions of the flow that damps the vehicle.

@@ -7,8 +7,9 @@
 mod blocks;
 
 use self::blocks::{Parts, Signal, Source, axes};
-use super::interconnection::{Interconnection, Unknown};
-use super::{ControlLaw, DrawnVehicle, Layout, Model};
+use super::gradient::{C, Vectors};
+use super::interconnection::{Interconnection, Member, Unknown};
+use super::{ControlLaw, DrawnPath, DrawnVehicle, Layout, Model};
 use crate::vehicle::{
     Autopilot, Axis, FilterDraw, Law, ModeSet, Path, SensorKind, StateSpace, Vehicle, delay,
 };
@@ -72,6 +73,32 @@ pub struct Servo {
     slopes: Vec<Vec<Vector3<f64>>>,
     active: bool,
 }
+
+/// The servo part in the form of [`super::gradient`].
+#[derive(Debug, Clone)]
+pub struct ServoForm {
+    /// Its part of the form.
+    pub value: C,
+    /// Blocks that a draw changes.
+    members: Vec<(Source, Member)>,
+    /// Gradient by the scale of each sensor.
+    pub scale: Vec<C>,
+    /// Gradient by the slope gain of each sensor and mode.
+    pub slope_gain: Vec<Vec<C>>,
+}
+
+impl ServoForm {
+    /// The part of an actuator with this torque law, linear in its matrices.
+    pub fn actuator(&self, engine: usize, axis: usize, torque: &StateSpace) -> C {
+        let of = self.members.iter().find(
+            |(source, _)| matches!(source, Source::Actuator(e, _, a) if (*e, *a) == (engine, axis)),
+        );
+        of.map_or(C::ZERO, |(_, member)| member.part(torque))
+    }
+}
+
+/// Why composing cannot fail.
+const NO_LOOP: &str = "algebraic loops are refused when it is prepared";
 
 /// A linear combination of coordinates, or of their rates.
 #[derive(Debug, Clone, PartialEq)]
@@ -182,6 +209,11 @@ impl Servo {
 
     /// The whole of a drawn vehicle: from mechanical signals and external inputs to torques, N·m.
     pub fn compose(&self, drawn: &DrawnVehicle) -> StateSpace {
+        self.connection.compose(&self.blocks(drawn)).expect(NO_LOOP)
+    }
+
+    /// The blocks of a drawn vehicle.
+    fn blocks(&self, drawn: &DrawnVehicle) -> Vec<StateSpace> {
         let block = |source: &Source| match source {
             Source::Actuator(engine, set, axis) => {
                 drawn.engines[*engine].actuators[*set][*axis].torque.clone()
@@ -194,8 +226,87 @@ impl Servo {
             }
             Source::Axis(paths) => self.axis(drawn.autopilot.delay_s, *paths),
         };
-        let blocks: Vec<StateSpace> = self.sources.iter().map(block).collect();
-        self.connection.compose(&blocks).expect("algebraic loops are refused when it is prepared")
+        self.sources.iter().map(block).collect()
+    }
+
+    /// The part of this servo part in the form of [`super::gradient`], `−ȳ_Θᵀ τ − ȳ_aᵀ (A x_a + B y)`, and
+    /// what its gradient follows from; signals, torques and `feedback` as in [`Servo::attach`].
+    pub fn form(
+        &self,
+        drawn: &DrawnVehicle,
+        feedback: f64,
+        layout: &Layout,
+        vectors: &Vectors<'_>,
+    ) -> ServoForm {
+        let share = |signal: &Signal, rate: bool| {
+            let share = if matches!(signal, Signal::Sensor(..)) { feedback } else { 1.0 };
+            if rate { vectors.s * share } else { C::from(share) }
+        };
+        let mut external = vec![C::ZERO; self.connection.inputs().len()];
+        for (value, signal) in external.iter_mut().zip(&self.signals) {
+            let row = self.row(*signal, drawn, layout);
+            let sum: C = row.entries.iter().map(|(at, factor)| vectors.right[*at] * *factor).sum();
+            *value = share(signal, row.rate) * sum;
+        }
+        // Outputs beside the torques weigh nothing.
+        let mut weights = vec![C::ZERO; self.connection.outputs().len()];
+        for (weight, torque) in weights.iter_mut().zip(&self.torques) {
+            *weight = gimbal(layout, *torque).map_or(C::ZERO, |at| -vectors.left[at]);
+        }
+        let states = layout.first_order();
+        let state_weights: Vec<C> = vectors.left[states.clone()].iter().map(|z| -z).collect();
+        let local = self
+            .connection
+            .local(
+                &self.blocks(drawn),
+                [&vectors.right[states], &external],
+                [&weights, &state_weights],
+            )
+            .expect(NO_LOOP);
+        let mut scale = vec![C::ZERO; drawn.autopilot.sensors.len()];
+        let mut slope_gain: Vec<Vec<C>> =
+            drawn.autopilot.sensors.iter().map(|s| vec![C::ZERO; s.slope_gain.len()]).collect();
+        for (signal, by) in self.signals.iter().zip(&local.by_external) {
+            let Signal::Sensor(sensor, axis) = *signal else { continue };
+            let draw = &drawn.autopilot.sensors[sensor];
+            let row = self.sensor_row(sensor, axis, drawn, layout);
+            let by = by * share(signal, row.rate);
+            for (mode, at) in layout.elastic().enumerate() {
+                let slope = vectors.right[at] * self.slopes[sensor][mode][axis as usize];
+                slope_gain[sensor][mode] += by * slope * draw.scale;
+                scale[sensor] += by * slope * draw.slope_gain[mode];
+            }
+            if let Some(at) = layout.rotation().nth(axis as usize) {
+                scale[sensor] += by * vectors.right[at];
+            }
+        }
+        let members = self.sources.iter().zip(local.members);
+        let kept = members.filter_map(|(source, member)| match source {
+            Source::Fixed(_) => None,
+            source => Some((source.clone(), member)),
+        });
+        ServoForm { value: local.value, members: kept.collect(), scale, slope_gain }
+    }
+
+    /// The part of a path in `form` with the numbers of `draw`, linear in its matrices; zero where the
+    /// autopilot does not act.
+    pub fn path_part(&self, form: &ServoForm, path: usize, draw: &DrawnPath) -> C {
+        let of = form.members.iter().find_map(|(source, member)| match source {
+            Source::Path(index, weights) if *index == path => Some((weights, member)),
+            _ => None,
+        });
+        of.map_or(C::ZERO, |(weights, member)| {
+            member.part(&path_system(&self.paths()[path], draw.gain, draw.filters.iter(), weights))
+        })
+    }
+
+    /// The part of all axes in `form` with this loop delay; zero where the autopilot does not act.
+    pub fn delay_part(&self, form: &ServoForm, delay_s: f64) -> C {
+        let of = form.members.iter().filter_map(|(source, member)| match source {
+            Source::Axis(paths) => Some(member.part(&self.axis(delay_s, *paths))),
+            _ => None,
+        });
+        of.sum()
     }
 
     /// A block as the vehicle has it nominally, with a gain of one on paths.

@@ -203,6 +203,7 @@ fn outcome(gate: &Gate, plan: &Plan<'_>, source: &impl Source) -> Result<Outcome
         population: &selection.population,
         variant: selection.variant.as_deref(),
         baseline: selection.baseline.as_deref(),
+        baseline_run: selection.baseline_run,
         flight_times_s: selection.flight_times_s.as_deref(),
         mode: selection.mode.as_deref(),
         worst: worst(gate),
@@ -295,6 +296,7 @@ fn describe(
     };
     Outcome {
         id: gate.id.clone(),
+        population: gate.selection.population.clone(),
         verdict,
         severity: gate.severity,
         statistic: statistic_in_words(gate),
@@ -396,6 +398,7 @@ fn statistic_in_words(gate: &Gate) -> String {
             format!("bound of {of} kept by {} of the population", coverage.get())
         }
     };
+    let words = if selection.baseline_run { words + ", less the baseline run" } else { words };
     match &selection.flight_times_s {
         None => words,
         Some(times) => {

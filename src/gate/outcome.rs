@@ -20,6 +20,8 @@ pub struct Offender {
 pub struct Outcome {
     /// Name of the gate.
     pub id: String,
+    /// The population whose cases are held against the limit.
+    pub population: String,
     /// What it concludes.
     pub verdict: Verdict,
     /// Whether it decides the exit code.
@@ -61,7 +63,9 @@ pub struct Outcome {
     /// Further cases needed for a pass if violations go on at the observed rate; null where no
     /// number is enough.
     pub cases_needed_at_observed_rate: Option<u64>,
-    /// The worst violations, failed cases first, at most [`Outcome::OFFENDERS`] of them.
+    /// The worst violations, failed cases first. `gates.json` lists 20; up to 1000 are stored as a
+    /// table beside it.
+    #[serde(serialize_with = "listed")]
     pub offenders: Vec<Offender>,
     /// One sentence for people.
     pub message: String,
@@ -70,8 +74,14 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Offenders listed at most.
-    pub const OFFENDERS: usize = 20;
+    /// Offenders kept at most.
+    pub const OFFENDERS: usize = 1000;
+    /// Offenders listed in `gates.json` at most.
+    pub const LISTED: usize = 20;
+}
+
+fn listed<S: serde::Serializer>(offenders: &[Offender], serializer: S) -> Result<S::Ok, S::Error> {
+    serde::Serialize::serialize(&offenders[..offenders.len().min(Outcome::LISTED)], serializer)
 }
 
 /// All outcomes, as `gates.json` has them.

@@ -41,6 +41,9 @@ pub struct RawGate {
     /// Variant to compare with: the metric becomes its value in `variant` less that in `baseline`,
     /// on the same draw, flight time and mode.
     pub baseline: Option<String>,
+    /// Whether the metric is its value in this run less that in the baseline run that the command
+    /// names (`--baseline`), on the same draw, flight time and mode.
+    pub baseline_run: Option<bool>,
     /// Flight times, s; all unless given. A case counts with its worst.
     pub flight_times_s: Option<Vec<f64>>,
     /// Named mode; all unless given. A case counts with its worst.

@@ -15,16 +15,18 @@ pub(super) struct Run {
     variants: Vec<String>,
     flight_times_s: Vec<f64>,
     modes: Vec<String>,
+    baseline: Option<Box<Run>>,
 }
 
 impl Run {
-    pub(super) fn of(source: &impl Names) -> Self {
+    pub(super) fn of(source: &(impl Names + ?Sized)) -> Self {
         Self {
             metrics: source.metrics(),
             populations: source.populations(),
             variants: source.variants(),
             flight_times_s: source.flight_times_s(),
             modes: source.modes(),
+            baseline: source.baseline().map(|other| Box::new(Self::of(other))),
         }
     }
 }
@@ -95,6 +97,36 @@ impl Check<'_> {
     }
 
     fn resolve<'a>(&mut self, gate: &Gate, run: &'a Run) -> Option<Plan<'a>> {
+        let (metric, population) = self.names(gate, run);
+        if gate.selection.baseline_run {
+            self.baseline_run(gate, run);
+        }
+        let claim = population.and_then(|population| self.claim(gate, population));
+        let plan = Plan { metric: metric?, population: population?, claim: claim? };
+        self.problems.0.is_empty().then_some(plan)
+    }
+
+    /// What a gate on the difference to the baseline run needs of that run.
+    fn baseline_run(&mut self, gate: &Gate, run: &Run) {
+        let Some(baseline) = &run.baseline else {
+            let allowed = "a baseline run, which `tvse gate RUN --baseline OTHER` and `tvse compare RUN \
+                           OTHER --gates FILE` name";
+            self.problem("baseline_run", "no baseline run", allowed);
+            return;
+        };
+        let before = self.problems.0.len();
+        self.names(gate, baseline);
+        for problem in &mut self.problems.0[before..] {
+            problem.found += " for the baseline run";
+        }
+    }
+
+    /// The metric and the population of a gate, and everything it names that the run does not have.
+    fn names<'a>(
+        &mut self,
+        gate: &Gate,
+        run: &'a Run,
+    ) -> (Option<&'a Metric>, Option<&'a Population>) {
         let selection = &gate.selection;
         let populations: Vec<String> = run.populations.iter().map(|p| p.name.clone()).collect();
         self.known("population", Some(&selection.population), &populations);
@@ -127,9 +159,7 @@ impl Check<'_> {
                 allowed_instead(&gate.metric, names.iter().map(|n| n.as_ref())),
             );
         }
-        let claim = population.and_then(|population| self.claim(gate, population));
-        let plan = Plan { metric: metric?, population: population?, claim: claim? };
-        self.problems.0.is_empty().then_some(plan)
+        (metric, population)
     }
 
     /// Selections that the table of the metric needs or does not have.
@@ -158,7 +188,8 @@ impl Check<'_> {
                 }
             }
         }
-        if selection.baseline.is_some() && metric.missing == MissingMeans::NotApplicableGood {
+        let paired = selection.baseline.is_some() || selection.baseline_run;
+        if paired && metric.missing == MissingMeans::NotApplicableGood {
             let found = format!("a difference of {}", metric.name);
             self.problem("baseline", found, "a metric that every evaluation has");
         }

@@ -102,6 +102,8 @@ pub struct Selection {
     pub variant: Option<String>,
     /// Variant whose value is subtracted.
     pub baseline: Option<String>,
+    /// Whether the value of the baseline run is subtracted.
+    pub baseline_run: bool,
     /// Flight times, s; `None`: all.
     pub flight_times_s: Option<Vec<f64>>,
     /// Named mode; `None`: all.
@@ -309,6 +311,15 @@ impl Check<'_> {
             );
             return None;
         }
+        let baseline_run = raw.baseline_run.unwrap_or(false);
+        if baseline_run && raw.baseline.is_some() {
+            self.problem(
+                "baseline_run",
+                "true",
+                "false, or no `baseline`: one difference at a time",
+            );
+            return None;
+        }
         Some(Gate {
             id: id?,
             metric: metric?,
@@ -316,6 +327,7 @@ impl Check<'_> {
                 population: raw.population.unwrap_or_else(|| "dispersed".into()),
                 variant: raw.variant,
                 baseline: raw.baseline,
+                baseline_run,
                 flight_times_s: raw.flight_times_s,
                 mode: raw.mode,
             },

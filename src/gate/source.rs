@@ -67,6 +67,8 @@ pub struct Query<'a> {
     pub variant: Option<&'a str>,
     /// Variant whose value is subtracted row by row, before the reduction.
     pub baseline: Option<&'a str>,
+    /// Whether the value of the baseline run is subtracted row by row, before the reduction.
+    pub baseline_run: bool,
     /// Flight times, s; `None`: all.
     pub flight_times_s: Option<&'a [f64]>,
     /// Named mode; `None`: all named modes.
@@ -96,6 +98,10 @@ pub trait Names {
     fn flight_times_s(&self) -> Vec<f64>;
     /// The named modes.
     fn modes(&self) -> Vec<String>;
+    /// What the run has that this one is compared with, if any.
+    fn baseline(&self) -> Option<&dyn Names> {
+        None
+    }
 }
 
 /// A finished run as gates see it.

@@ -394,6 +394,16 @@ pub fn write_new(target: &Path, bytes: &[u8]) -> Result<bool, Problems> {
     aside.finish_new()
 }
 
+/// Adds to the end of a file, which is made where there is none: for files that others write to as well.
+///
+/// # Errors
+/// One problem if it cannot be written.
+pub fn append(target: &Path, text: &str) -> Result<(), Problems> {
+    let file = File::options().append(true).create(true).open(target);
+    file.and_then(|mut file| file.write_all(text.as_bytes()))
+        .map_err(|error| write_problem(target, &error))
+}
+
 /// The problem of a file that could not be written.
 pub fn write_problem(target: &Path, error: &io::Error) -> Problems {
     problem(target, error, "a writable folder on a disk with free space")

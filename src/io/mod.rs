@@ -16,7 +16,9 @@ pub mod lock;
 pub mod maker;
 pub mod manifest;
 pub mod model;
+pub mod offenders;
 pub mod package;
+pub mod pair;
 pub mod plan;
 pub mod replay;
 pub mod response;
@@ -33,6 +35,7 @@ pub mod summarise;
 #[cfg(test)]
 mod synthetic;
 pub mod table;
+pub mod worst;
 
 pub use results::{Finished, Opening, Results};
 pub use run::Run;

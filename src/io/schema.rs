@@ -5,6 +5,7 @@
 
 use super::column::Column;
 use crate::campaign::Population;
+use crate::campaign::Sensitivity;
 use crate::campaign::loop_metric::loop_metrics;
 use crate::campaign::metric::metrics;
 use crate::campaign::nested::Statement;
@@ -146,7 +147,10 @@ impl TableName {
                     StoredPoles::Named => definition.modes.len() as u64,
                     StoredPoles::All => ALL_POLES,
                 };
-                (variants * times) as u64 * poles
+                // With derivatives a row is as long as many.
+                let rule = definition.sensitivity.as_ref();
+                let long = rule.map_or(0, |_| outline.draws.len() as u64 / 8);
+                (variants * times) as u64 * poles * (1 + long)
             }
             Self::Margins => (axes * times) as u64,
             Self::LoopModes => (axes * times) as u64 * RESONANCES,
@@ -382,6 +386,62 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
             r.outcome.as_ref().err().map(|f| f.message.as_str())
         }),
     ]);
+    columns.extend(sensitivity(outline));
+    columns
+}
+
+/// Words of the `sensitivity` column.
+pub const SENSITIVITIES: [&str; 2] = ["ok", "veering"];
+
+/// Columns of derivatives, where the run stores them.
+fn sensitivity(outline: &Outline) -> Vec<Column<ModeRow>> {
+    if outline.definition.sensitivity.is_none() {
+        return Vec::new();
+    }
+    fn of(row: &ModeRow) -> Option<&Sensitivity> {
+        row.outcome.as_ref().ok()?.sensitivity.as_deref()
+    }
+    let mut columns = vec![
+        Column::word(
+            "sensitivity",
+            "ok, or veering: the derivatives are right but the nearest pole bends what a change of one \
+             sigma does by more than a tenth; NULL where none are stored",
+            SENSITIVITIES,
+            |r: &ModeRow| of(r).map(|s| usize::from(s.is_veering())),
+        ),
+        Column::number(
+            "sensitivity_curvature",
+            "1",
+            "Second-order change of the pole by the nearest other pole for one sigma of each key, over \
+             the first-order change (root sums of squares over the keys)",
+            |r: &ModeRow| of(r)?.curvature,
+        ),
+    ];
+    for (index, draw) in outline.draws.iter().enumerate() {
+        let description = format!(
+            "Change of the damping ratio per sigma of the independent normal score of {}; NULL where \
+             its value has no slope",
+            draw.key
+        );
+        columns.push(Column::number(
+            draw.damping_column(),
+            "1",
+            description,
+            move |r: &ModeRow| of(r)?.damping_ratio.get(index).copied().flatten(),
+        ));
+    }
+    for (index, draw) in outline.draws.iter().enumerate() {
+        let description = format!(
+            "Change of the real part of the pole per sigma of the independent normal score of {}",
+            draw.key
+        );
+        columns.push(Column::number(
+            draw.real_column(),
+            "rad/s",
+            description,
+            move |r: &ModeRow| of(r)?.real_part_rad_s.get(index).copied().flatten(),
+        ));
+    }
     columns
 }
 

@@ -15,7 +15,8 @@ use crate::problem::Problems;
 /// Columns of numbers that say which row it is, not what was found.
 const KEYS: [&str; 2] = ["case", "flight_time_s"];
 
-type Value = Result<Option<f64>, String>;
+/// The value of a row, `None` where it has none, or why it failed.
+pub(super) type Value = Result<Option<f64>, String>;
 
 impl Names for Outline {
     fn metrics(&self) -> Vec<Metric> {
@@ -135,6 +136,44 @@ struct Place {
     baseline: Vec<Row>,
 }
 
+/// The values of a variant at chosen flight times (s) and named modes for a range of cases: of each case
+/// that is present, one a choice, that of the less stable pole.
+///
+/// # Errors
+/// Damage in the table.
+pub(super) fn less_stable_values(
+    run: &Run,
+    (population, cases): (usize, std::ops::Range<u64>),
+    metric: &Metric,
+    variant: usize,
+    chosen: &[(f64, String)],
+) -> Result<Vec<(u64, Vec<Value>)>, Problems> {
+    let definition = &run.outline().definition;
+    let get = getter(run, metric);
+    let place = |row: &ModeRow| {
+        let time = definition.flight_times_s[row.flight_time];
+        let mode = &definition.modes[row.mode?];
+        chosen.iter().position(|(at, name)| *at == time && name == mode)
+    };
+    let mut found: Vec<(u64, Vec<Vec<Row>>)> = Vec::new();
+    run.modes(population, cases, |row| {
+        if found.last().is_none_or(|(case, _)| *case != row.case) {
+            let places = chosen.iter().map(|_| Vec::new()).collect();
+            found.push((row.case, places));
+        }
+        if row.variant == variant
+            && let (Some(place), Some((_, places))) = (place(&row), found.last_mut())
+        {
+            places[place].push(value(&row, &get));
+        }
+        Ok(())
+    })?;
+    let values = |(case, places): (u64, Vec<Vec<Row>>)| {
+        (case, places.iter().map(|rows| less_stable(rows)).collect())
+    };
+    Ok(found.into_iter().map(values).collect())
+}
+
 fn of_modes(
     run: &Run,
     population: usize,
@@ -142,11 +181,7 @@ fn of_modes(
     visit: Visit<'_>,
 ) -> Result<(), Problems> {
     let definition = &run.outline().definition;
-    let columns = schema::modes(run.outline());
-    let column = columns.iter().find(|column| column.name == query.metric.name);
-    let Some(Column { get: Get::Number(get), .. }) = column else {
-        unreachable!("gates ask for columns of numbers of the run")
-    };
+    let get = getter(run, query.metric);
     let variant =
         |name: Option<&str>| definition.variants.iter().position(|v| Some(v.name.as_str()) == name);
     let (here, baseline) = (variant(query.variant), variant(query.baseline));
@@ -180,14 +215,24 @@ fn of_modes(
         let Some(mode) = row.mode else { return Ok(()) };
         let place = &mut places[row.flight_time * width + mode];
         if Some(row.variant) == here {
-            place.here.push(value(&row, get));
+            place.here.push(value(&row, &get));
         }
         if Some(row.variant) == baseline {
-            place.baseline.push(value(&row, get));
+            place.baseline.push(value(&row, &get));
         }
         Ok(())
     })?;
     last.map_or(Ok(()), |last| finish(last, &mut places))
+}
+
+/// How a metric is taken from a row of the table `modes`.
+fn getter(run: &Run, metric: &Metric) -> Box<dyn Fn(&ModeRow) -> Option<f64>> {
+    let columns = schema::modes(run.outline());
+    match columns.into_iter().find(|column| column.name == metric.name).map(|column| column.get) {
+        Some(Get::Number(get)) => get,
+        Some(Get::Count(get)) => Box::new(move |row| get(row).map(|count| count as f64)),
+        _ => unreachable!("gates ask for columns of numbers of the run"),
+    }
 }
 
 fn value(row: &ModeRow, get: impl Fn(&ModeRow) -> Option<f64>) -> Row {
@@ -256,6 +301,7 @@ mod tests {
             population: "dispersed",
             variant: Some("jet"),
             baseline: None,
+            baseline_run: false,
             flight_times_s: None,
             mode: Some("tvse"),
             worst: Worst::Smallest,

@@ -4,6 +4,7 @@
 
 use super::run::Run;
 use super::schema::{self, TableName};
+use crate::campaign::Sensitivity;
 use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
 use crate::campaign::row::ModeRow;
 use crate::dynamics::Part;
@@ -126,6 +127,18 @@ impl Run {
             }
             Some(shares)
         };
+        let stored = definition.sensitivity.is_some();
+        let flags = if stored { words("sensitivity", &schema::SENSITIVITIES)? } else { Vec::new() };
+        let draws = &self.outline().draws;
+        let sensitivity = |row: usize| {
+            flags.get(row).copied().flatten()?;
+            let read = |name: String| number(&name, row);
+            Some(Box::new(Sensitivity {
+                damping_ratio: draws.iter().map(|draw| read(draw.damping_column())).collect(),
+                real_part_rad_s: draws.iter().map(|draw| read(draw.real_column())).collect(),
+                curvature: number("sensitivity_curvature", row),
+            }))
+        };
         let mut rows = Vec::with_capacity(batch.num_rows());
         for row in 0..batch.num_rows() {
             let damage = |found: &str, allowed: &str| self.damage(TableName::Modes, found, allowed);
@@ -153,6 +166,7 @@ impl Run {
                         identity_confidence: number("identity_confidence", row),
                         participation: participation(row),
                         residual: number("residual", row),
+                        sensitivity: sensitivity(row),
                     })
                 }
                 Some(failed) => Err(Failure::new(

@@ -59,7 +59,7 @@ pub enum Lost {
 /// Overlap below which a pole is not taken for the mode: below it more than two others share it.
 const LEAST_OVERLAP: f64 = 0.2;
 /// A homotopy step is accepted when the best overlap is at least this …
-const STEP_OVERLAP: f64 = 0.9;
+pub const STEP_OVERLAP: f64 = 0.9;
 /// … and else halved, down to this fraction of the whole way; there the best is taken.
 const LEAST_STEP: f64 = 1.0 / 256.0;
 /// Candidates are drawn in until the overlaps found leave no more than this unaccounted for.
@@ -132,8 +132,13 @@ impl Reference {
             .sum()
     }
 
-    /// Two-sided overlap of this reference with a pole of another model.
-    fn overlap(&self, other: &Reference) -> c64 {
+    /// `yᴴ L'(s) x`, the scale of eigenvalue derivatives.
+    pub fn derivative(&self) -> c64 {
+        self.derivative
+    }
+
+    /// Two-sided overlap of this reference with a pole of another model, see [`Candidate::overlap`].
+    pub fn overlap(&self, other: &Reference) -> c64 {
         self.project(&other.pair) * other.project(&self.pair) / (self.derivative * other.derivative)
     }
 

@@ -1,11 +1,15 @@
 //! Reports: values become text for people, terminal tables first.
 
 pub mod actuator;
+pub mod annotations;
 pub mod feedback;
 pub mod figure;
 pub mod gates;
 pub mod how_many;
 pub mod import;
+pub mod influence;
+pub mod junit;
+pub mod markdown;
 pub mod modes;
 pub mod nominal;
 mod number;
@@ -13,5 +17,6 @@ pub mod plan;
 pub mod scenario;
 pub mod statistics;
 pub mod story;
+pub mod worst;
 
 pub use number::{percent, significant};

@@ -16,8 +16,14 @@ pub struct Rows {
 }
 
 impl Rows {
-    fn new(head: &[&'static str]) -> Self {
+    /// An empty table with this heading.
+    pub fn new(head: &[&'static str]) -> Self {
         Self { head: head.to_vec(), rows: Vec::new() }
+    }
+
+    /// Adds a row.
+    pub fn push(&mut self, row: Vec<String>) {
+        self.rows.push(row);
     }
 
     /// As a text table; numbers with four digits.
@@ -57,7 +63,8 @@ impl Rows {
     }
 }
 
-fn number(value: Option<f64>) -> String {
+/// A number as a cell; an empty one where there is none.
+pub fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map_or_else(String::new, |value| value.to_string())
 }
 

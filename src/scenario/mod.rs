@@ -5,6 +5,7 @@ pub mod aerodynamics;
 pub mod autopilot;
 pub mod autopilot_file;
 pub mod dispersion;
+mod fixed;
 #[cfg(test)]
 mod fixture;
 pub mod gimbal;

@@ -8,7 +8,7 @@ use super::run_file::{
 };
 use super::table::Findings;
 use super::vehicle::Resolved;
-use super::{names, pattern, plan};
+use super::{fixed, names, pattern, plan};
 use crate::campaign::definition::Feedback;
 use crate::campaign::{Definition, LoopPlan, NozzleJet, Population, Slope, Variant};
 use crate::dispersion::{Dispersion, Draw, Listed, Scheme};
@@ -117,6 +117,9 @@ pub fn resolve(
             populations.push(fixed_case);
         }
     }
+    let fixed = fixed::populations(file, &populations, dispersion, f);
+    populations.extend(fixed);
+    let sensitivity = fixed::sensitivity(file, &variants, &flight_times_s, f);
     findings.finish(Some(Run {
         definition: Definition {
             name: name.into(),
@@ -127,6 +130,7 @@ pub fn resolve(
             modes: file.modes.clone(),
             gimballed,
             exchange_ratio: file.identity.exchange_ratio,
+            sensitivity,
             margins,
         },
         corners,

@@ -6,6 +6,7 @@ use crate::campaign::definition::MOST_CASES;
 use crate::margins::Settings;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 
 /// A campaign: which vehicle and dispersion, how many cases, evaluated where and how.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -47,6 +48,43 @@ pub struct RunFile {
     /// Adverse corners: fixed cases with Monte Carlo around them.
     #[serde(default)]
     pub corner: Vec<CornerFile>,
+    /// Where the poles are stored with their derivatives by every draw (default: nowhere).
+    pub sensitivity: Option<SensitivityFile>,
+    /// Fixed cases, for instance those that `tvse worst` found and wrote.
+    #[serde(default)]
+    pub fixed: Vec<FixedFile>,
+}
+
+/// Evaluations whose poles are stored with the change of damping ratio and real part per σ of every
+/// draw key: two more columns of the table `modes` a key.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensitivityFile {
+    /// Names of variants (default: all).
+    pub variants: Option<Vec<String>>,
+    /// Flight times of the run, s (default: all).
+    pub flight_times_s: Option<Vec<f64>>,
+    /// Only the first cases of each population (default: all).
+    #[schemars(range(min = 1, max = MOST_CASES))]
+    pub cases: Option<u64>,
+}
+
+/// A fixed case: draw keys at given values, the others nominal; and Monte Carlo around it.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FixedFile {
+    /// Name, a–z, 0–9 and _.
+    pub name: String,
+    /// Whole draw keys and their values, in the unit of the law.
+    pub values: BTreeMap<String, f64>,
+    /// Number of cases around it: keys without a value, and those in `free`, are drawn.
+    #[serde(default)]
+    #[schemars(range(max = MOST_CASES))]
+    pub cases: u64,
+    /// Keys with a value that are drawn all the same in the cases around it, by parameter path, with `*`,
+    /// or whole key.
+    #[serde(default)]
+    pub free: Vec<String>,
 }
 
 fn every_engine() -> Vec<String> {

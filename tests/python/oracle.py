@@ -1,9 +1,9 @@
 """An independent model of a dispersed vehicle, written from the equations and not from the program.
 
 It reads vehicle.toml, the modal package and the draws stored in `cases`, and assembles M, D and K
-from the block formulas (5), (6), (13), (14) and the KKT system (16) of the paper. Every entry comes
-with its `size`, the sum of the moduli of the terms it is made of: rounding cannot move an entry by
-more than a modest multiple of machine epsilon times that.
+from the block formulas (5), (6), (13), (14) and the KKT system (16) of the paper, with slosh masses
+locked. Every entry comes with its `size`, the sum of the moduli of the terms it is made of: rounding
+cannot move an entry by more than a modest multiple of machine epsilon times that.
 """
 
 import fnmatch
@@ -124,7 +124,9 @@ TEMPLATES = """structure.damping modes.<label>.damping modes.<label>.frequency
 <group>.<engine>.nozzle.inertia <group>.<engine>.nozzle.axial_inertia <group>.<engine>.nozzle.length
 <group>.<engine>.nozzle.ablation <group>.<engine>.bearing.stiffness <group>.<engine>.bearing.damping
 <group>.<engine>.actuator.<actuator>.stiffness <group>.<engine>.actuator.<actuator>.damping
-<group>.<engine>.gimbal.<label>.shape <group>.<engine>.gimbal.<label>.slope""".split()
+<group>.<engine>.gimbal.<label>.shape <group>.<engine>.gimbal.<label>.slope
+tank.<tank>.slosh.mass tank.<tank>.slosh.frequency tank.<tank>.slosh.damping
+body.roll_inertia body.pitch_inertia body.yaw_inertia""".split()
 
 
 @dataclass
@@ -140,6 +142,9 @@ def instances(vehicle, template):
     """Paths of a template in a vehicle, each with its modal label, if any."""
     labels = sorted(vehicle.package.modes.label.unique()) if "<label>" in template else [None]
     engines = vehicle.file["engine"] if "<engine>" in template else [None]
+    if "<tank>" in template:
+        yield from ((template.replace("<tank>", t["name"]), None) for t in vehicle.file["tank"])
+        return
     for engine in engines:
         if engine and template.endswith("ablation") and "ablation" not in engine["nozzle"]:
             continue
@@ -159,6 +164,7 @@ def expansion(level):
         "vehicle": [],
         "actuator": ["<group>", "<engine>", "<actuator>"],
         "mode": ["<group>", "<engine>", "<label>"],
+        "tank": ["<tank>"],
     }.get(level, ["<group>", "<engine>"])
 
 
@@ -167,7 +173,7 @@ def draws(vehicle, table):
     found = {}
     for row in table["row"]:
         written = row["path"].split(".")
-        names = ["vehicle", "actuator", "mode"]
+        names = ["vehicle", "actuator", "mode", "tank"]
         level = row["level"] if row["level"] in names else "engine"
         for template in TEMPLATES:
             segments = template.split(".")
@@ -284,6 +290,14 @@ def nozzle(engine, path, case, burned):
     return m, r, j, axial
 
 
+def slosh_mass(tank, path, case, time):
+    """m_1 of a flat-bottomed cylinder, first antisymmetric mode (NASA SP-106), as drawn."""
+    xi, liquid = 1.8411837813406593, np.interp(time, tank["time_s"], tank["liquid_kg"])
+    radius, density = tank["cylinder"]["radius_m"], tank["cylinder"]["density_kg_m3"]
+    depth = xi * liquid / (density * np.pi * radius**3)
+    return case(f"{path}.mass", liquid * 2 * np.tanh(depth) / (depth * (xi**2 - 1)))
+
+
 class Motor:
     """Thrust, flow, specific impulse and burned fraction of an engine at a time, as drawn."""
 
@@ -302,7 +316,7 @@ class Motor:
 
 def assemble(vehicle, time, variant, gimballed, case=None, coupling=1.0, push=1.0):
     """M, D, K and the names of the coordinates; `coupling` scales the inertia between η and Θ and of
-    the engines on η, `push` thrust and flow (both for continuation)."""
+    engines and slosh masses on η, `push` thrust and flow (both for continuation)."""
     case = case or Case({}, {})
     labels, hertz, phi, psi, where, body = vehicle.package.at(time)
     k, names = len(labels), [f"eta.{label}" for label in labels]
@@ -326,6 +340,11 @@ def assemble(vehicle, time, variant, gimballed, case=None, coupling=1.0, push=1.
         path = f"{engine['group']}.{engine['name']}"
         motor = Motor(vehicle, engine, path, case, time)
         engines.append((engine, path, motor, nozzle(engine, path, case, motor.burned)))
+    # With slosh off, a slosh mass is locked to its tank.
+    locked = [(t["grid"], slosh_mass(t, f"tank.{t['name']}.slosh", case, time)) for t in vehicle.file["tank"]]
+    for grid, mass in locked:
+        M.add(eta, eta, coupling * (mass * (Sized(phi[grid]).T @ Sized(phi[grid]))))
+    body += sum(mass for _, mass in locked)
     on = push if variant["thrust"] else 0.0
     force = sum(on * motor.thrust * unit(e["thrust_direction"]) for e, _, motor, _ in engines)
     g0 = force / (body + sum(m for *_, (m, *_) in engines))

@@ -7,6 +7,7 @@ import control
 import numpy as np
 import pandas as pd
 import pytest
+import scipy.linalg
 
 from conftest import ROOT, tvse
 
@@ -262,6 +263,33 @@ def test_the_closed_loop_is_the_one_that_python_control_closes(models, vehicle):
         ours = ours[np.abs(ours) > 0.05]
         near = np.abs(ours[:, None] - theirs[None, :]).min(axis=1)
         assert (near <= 1e-6 * (1 + np.abs(ours))).all(), (population, case, variant)
+
+
+def balanced(system):
+    """The same system in states of like size: the matrix exponential of rad beside Pa keeps no digits."""
+    a, (scale, _) = scipy.linalg.matrix_balance(system.A, permute=False, separate=True)
+    return control.ss(a, system.B / scale[:, None], system.C * scale, system.D)
+
+
+def test_step_responses_are_those_of_the_loop_that_python_control_closes(models, vehicle):
+    law, signals = feedback(vehicle)
+    commands = [f"command.{a}" for a in AXES]
+    t = np.linspace(0.0, 3.0, 301)
+    step = lambda system: control.step_response(balanced(system), t, squeeze=False)[1]
+    for (population, case, variant), model in models.items():
+        if variant == "open":
+            continue
+        plant = models[population, case, "open"].part(signals, commands)
+        closed = control.feedback(plant, law, sign=-1 if variant == "closed" else 1)
+        expected, found = step(closed), step(model.part(signals, commands))
+        # To the largest signal that a command moves; rounding grows with the least stable pole.
+        growth = np.exp(t[-1] * max(np.linalg.eigvals(closed.A).real.max(), 0.0))
+        scale = np.abs(expected).max(axis=(0, 2))
+        error = np.abs(found - expected).max(axis=(0, 2))
+        assert (error <= growth * len(closed.A) * np.finfo(float).eps * scale).all(), (population, case, variant)
+        # Nothing responds at once, and what a command turns has moved within three seconds.
+        assert (np.abs(expected[:, :, 0]).max(axis=0) <= 1e-12 * scale).all()
+        assert (scale > 0.01).all()
 
 
 def test_feedback_is_that_of_the_filters_in_python_control(models, vehicle):

@@ -3,7 +3,7 @@
 use crate::study::{Study, said};
 use std::path::Path;
 
-const COMMANDS: [&str; 25] = [
+const COMMANDS: [&str; 27] = [
     "init",
     "check",
     "plan",
@@ -21,6 +21,8 @@ const COMMANDS: [&str; 25] = [
     "compare",
     "gate",
     "replay",
+    "worst",
+    "influence",
     "response",
     "how-many",
     "planar",

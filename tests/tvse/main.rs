@@ -9,6 +9,7 @@ mod bad_input;
 mod commands;
 mod corpus;
 mod damage;
+mod derivatives;
 mod failures;
 mod import;
 mod outside;

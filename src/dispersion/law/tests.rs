@@ -400,3 +400,22 @@ fn impossible_arguments_are_refused_by_name() {
     refused(Law::truncated_normal(0.0, 1.0, sigma(-39.0), sigma(-38.0)), "high");
     refused(Law::truncated_normal(1e300, 1e-300, sigma(-1.0), sigma(1.0)), "high");
 }
+
+#[test]
+fn the_slope_is_what_differences_of_the_value_by_the_normal_score_say() {
+    for law in continuous() {
+        for z in [-2.3, -1.1, -0.2, 0.3, 1.4, 2.2] {
+            let slope = law.slope(&Position::of_score(z)).unwrap();
+            let at = |h: f64| law.value(&Position::of_score(z + h));
+            let step = 1e-4;
+            let secant = |h: f64| (at(h) - at(-h)) / (2.0 * h);
+            let expected = (4.0 * secant(step) - secant(2.0 * step)) / 3.0;
+            // Rounding of the value over the step; an inverse by iteration is good to some of its digits.
+            let scale = slope.abs() + 1e-9 * at(0.0).abs() / step;
+            assert!((slope - expected).abs() < 1e-5 * scale, "{law:?} at {z}: {slope} {expected}");
+        }
+    }
+    assert_eq!(Law::fixed(3.0).unwrap().slope(&Position::of_score(1.0)), Some(0.0));
+    let discrete = Law::discrete(&[1.0, 2.0], &[1.0, 1.0]).unwrap();
+    assert_eq!(discrete.slope(&Position::of_score(1.0)), None);
+}

@@ -257,3 +257,48 @@ fn plans_that_cannot_be_are_refused_with_their_keys() {
     // 22 good cases are needed, and the reference dispersion has no classes.
     assert_eq!(keys(&planned(nested)), ["plan.inner", "plan.kind"]);
 }
+
+#[test]
+fn fixed_cases_hold_their_keys_and_free_some_in_the_cases_around_them() {
+    let thrust = "booster.*.thrust @ vehicle";
+    let more = format!(
+        "\n[[fixed]]\nname = \"found\"\ncases = 7\nfree = [\"modes.m006.*\"]\n[fixed.values]\n\
+         \"{thrust}\" = 1.02\n\"modes.m006.damping @ mode\" = 0.004\n"
+    );
+    let (Run { definition, .. }, dispersion) = read(&(REFERENCE.to_owned() + &more)).unwrap();
+    let [case, cloud] = &definition.populations[4..] else { panic!("two more populations") };
+    assert_eq!((case.name.as_str(), case.cases, case.drawn), ("found", 1, false));
+    assert_eq!((cloud.name.as_str(), cloud.cases, cloud.drawn), ("found_dispersed", 7, true));
+    let index = |key: &str| dispersion.index(key).unwrap();
+    assert_eq!(cloud.fixed, [(index(thrust), 1.02)]);
+    assert_eq!(case.fixed.len(), 2);
+    assert!(case.fixed.contains(&(index("modes.m006.damping @ mode"), 0.004)));
+    for (from, to, key) in [
+        ("\"found\"", "\"adverse\"", "fixed[0].name"),
+        ("\"found\"", "\"Found\"", "fixed[0].name"),
+        (
+            "booster.*.thrust @",
+            "booster.*.trust @",
+            "fixed[0].values.\"booster.*.trust @ vehicle\"",
+        ),
+        ("= 1.02", "= nan", "fixed[0].values.booster.*.thrust @ vehicle"),
+        ("modes.m006.*", "modes.m0066.*", "fixed[0].free[0]"),
+    ] {
+        assert_eq!(keys(&(REFERENCE.to_owned() + &more.replacen(from, to, 1))), [key]);
+    }
+}
+
+#[test]
+fn derivatives_are_stored_where_the_run_asks_for_them() {
+    let cut = REFERENCE.find("[[corner]]").unwrap();
+    let with = |more: &str| format!("{}[sensitivity]\n{more}\n", &REFERENCE[..cut]);
+    let rule = |more: &str| read(&with(more)).unwrap().0.definition.sensitivity.unwrap();
+    let all = rule("");
+    assert_eq!((all.variants.len(), all.flight_times.len(), all.cases), (5, 7, None));
+    assert!(all.covers(4, 6, 1999));
+    let some = rule("variants = [\"jet_damping\"]\nflight_times_s = [110.0]\ncases = 10");
+    assert!(some.covers(3, 4, 9));
+    assert!(!some.covers(3, 4, 10) && !some.covers(2, 4, 0) && !some.covers(3, 3, 0));
+    assert_eq!(keys(&with("variants = [\"jet\"]")), ["sensitivity.variants[0]"]);
+    assert_eq!(keys(&with("flight_times_s = [111.0]")), ["sensitivity.flight_times_s[0]"]);
+}
