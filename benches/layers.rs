@@ -61,6 +61,7 @@ fn definition(vehicle: &Vehicle) -> Definition {
         modes: vec!["tvse".to_owned()],
         gimballed: vehicle.engines.iter().map(|e| e.group == "booster").collect(),
         exchange_ratio: 0.5,
+        solver: tvse::campaign::definition::Solver::Structured,
         sensitivity: None,
         margins: None,
     }

@@ -29,16 +29,7 @@ pub struct Spectrum {
     pencil: Pencil,
     secular: Secular,
     guesses: Vec<c64>,
-}
-
-/// A certified spectrum.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Certified {
-    /// Every pole but those at the origin that are known by construction, pairs by their member in the upper half
-    /// plane, sorted by imaginary, then real part.
-    pub poles: Vec<Bounded>,
-    /// Determinants evaluated.
-    pub evaluations: usize,
+    evaluations: usize,
 }
 
 impl Base {
@@ -67,14 +58,22 @@ impl Spectrum {
             pencil: Pencil::new(size),
             secular: Secular::default(),
             guesses: Vec::new(),
+            evaluations: 0,
         }
     }
 
-    /// All poles of `model`, found from those of `base`.
+    /// Determinants evaluated for the last model.
+    pub fn evaluations(&self) -> usize {
+        self.evaluations
+    }
+
+    /// All poles of `model`, found from those of `base`: pairs by their member in the upper half plane, sorted by
+    /// imaginary, then real part; without those at the origin that are known by construction.
     ///
     /// # Errors
     /// Why there is no certificate.
-    pub fn solve(&mut self, base: &Base, model: &Model) -> Result<Certified, Uncertain> {
+    pub fn solve(&mut self, base: &Base, model: &Model) -> Result<Vec<Bounded>, Uncertain> {
+        self.evaluations = 0;
         if base.degree() != model.states() {
             return Err(Uncertain::Unresolved);
         }
@@ -96,14 +95,13 @@ impl Spectrum {
             })
             .collect();
         let mut elsewhere = Vec::with_capacity(beside.len());
-        let mut evaluations = 0;
         for round in 0..MOST_ROUNDS {
             let mut points: Vec<c64> = self.secular.pending().collect();
             let nodes = points.len();
             if round == 0 {
                 points.extend(&beside);
             }
-            evaluations += points.len();
+            self.evaluations += points.len();
             for (group, chunk) in points.chunks(WIDTH).enumerate() {
                 let mut packed = Complexes::ZERO;
                 for lane in 0..WIDTH {
@@ -127,8 +125,7 @@ impl Spectrum {
             }
             self.secular.renew();
         }
-        let poles = self.secular.certify(elsewhere)?;
-        Ok(Certified { poles, evaluations })
+        self.secular.certify(elsewhere)
     }
 }
 

@@ -66,7 +66,10 @@ fn guess(m: c64, d: c64, k: c64, pole: c64) -> c64 {
         return c64::new(if best.re == 0.0 { pole.re } else { best.re }, 0.0);
     }
     let least = 0.05 * best.norm();
-    c64::new(best.re, if best.im.abs() >= least { best.im.abs() } else { least.max(f64::MIN_POSITIVE) })
+    c64::new(
+        best.re,
+        if best.im.abs() >= least { best.im.abs() } else { least.max(f64::MIN_POSITIVE) },
+    )
 }
 
 /// yᴴMx, yᴴDx and yᴴKx of eight poles.

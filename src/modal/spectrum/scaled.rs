@@ -55,12 +55,6 @@ impl Scaled {
         Self { mantissa: self.mantissa * factor, ..self }.normalised()
     }
 
-    /// Product.
-    pub fn times_scaled(self, other: Self) -> Self {
-        let exponent = self.exponent + other.exponent;
-        Self { mantissa: self.mantissa * other.mantissa, exponent }.normalised()
-    }
-
     /// Quotient.
     pub fn over(self, other: Self) -> Self {
         let exponent = self.exponent - other.exponent;

@@ -313,9 +313,8 @@ impl Secular {
                 changed = true;
             } else {
                 let others = adrift[position + 1..].iter().copied();
-                let others = others.filter(|other| {
-                    self.roots[*other].partner.is_none() && !gone.contains(other)
-                });
+                let others = others
+                    .filter(|other| self.roots[*other].partner.is_none() && !gone.contains(other));
                 let distance = |other: &usize| (self.at(self.roots[*other].own) - root).norm();
                 let Some(other) = others.min_by(|a, b| distance(a).total_cmp(&distance(b))) else {
                     continue;
@@ -444,8 +443,10 @@ impl Secular {
     /// Marks the lanes of a group and gathers its nodes and offsets.
     #[inline(always)]
     fn gather(&mut self, slots: impl Iterator<Item = usize>) -> Group {
-        let mut group =
-            Group { node: Complexes { re: [1.0; WIDTH], ..Complexes::ZERO }, offset: Complexes::ZERO };
+        let mut group = Group {
+            node: Complexes { re: [1.0; WIDTH], ..Complexes::ZERO },
+            offset: Complexes::ZERO,
+        };
         for (lane, slot) in slots.enumerate() {
             self.lane[slot] = lane as u8;
             let (node, offset) = (self.node[slot], self.offset[slot]);
@@ -541,7 +542,8 @@ impl Kernel for Step<'_> {
             let minus = V::splat(-1.0);
             let a = Complex { re: a.re.mul(over_a), im: a.im.mul(over_a).mul(minus) };
             let b = Complex { re: b.re.mul(over_b), im: b.im.mul(over_b).mul(minus) };
-            let w = Complex { re: zero_in(lane, V::splat(w.re)), im: zero_in(lane, V::splat(w.im)) };
+            let w =
+                Complex { re: zero_in(lane, V::splat(w.re)), im: zero_in(lane, V::splat(w.im)) };
             let term = w.mul(a);
             sum = sum.add(term);
             slope = slope.subtract_product(term, a);
@@ -592,7 +594,8 @@ impl Kernel for Measure<'_> {
             let lane = secular.lane[slot];
             let a = one_in(lane, node.sub(Complex::splat(z.re, z.im)).add(h));
             let b = one_in(lane, a.sub(Complex::splat(o.re, o.im)));
-            let w = Complex { re: zero_in(lane, V::splat(w.re)), im: zero_in(lane, V::splat(w.im)) };
+            let w =
+                Complex { re: zero_in(lane, V::splat(w.re)), im: zero_in(lane, V::splat(w.im)) };
             let reciprocal = a.reciprocal();
             sum = sum.add(w.mul(reciprocal));
             let over = reciprocal.square().sqrt();
