@@ -531,7 +531,7 @@ fn named_pole(
         identity_confidence: Some(found.overlap.norm()),
         participation: Some(participation(plant, &found.reference)),
         residual: Some(pair.residual),
-        error_bound: Some(pair.bound),
+        error_bound: Some(pair.bound).filter(|bound| bound.is_finite()),
         sensitivity: None,
     })
 }
@@ -555,7 +555,7 @@ fn other_pole(plant: &Plant, reference: &Reference) -> Pole {
         identity_confidence: None,
         participation: Some(participation(plant, reference)),
         residual: Some(reference.pair.residual),
-        error_bound: Some(reference.pair.bound),
+        error_bound: Some(reference.pair.bound).filter(|bound| bound.is_finite()),
         sensitivity: None,
     }
 }
@@ -621,7 +621,7 @@ fn at_time(
                 })?;
             if structured {
                 let mut solver = Solver::new(prepared.nominal.coordinates());
-                prepared.base = Base::of(&prepared.nominal, &mut solver).ok();
+                prepared.base = Base::proven(&prepared.nominal, &mut solver);
             }
             if definition.margins.as_ref().is_some_and(|plan| plan.holds(index)) {
                 let effects = prepared.effects;

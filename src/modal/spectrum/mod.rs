@@ -20,6 +20,8 @@ use super::{Solver, eigen};
 use crate::dynamics::Model;
 use faer::c64;
 
+/// Coordinates beyond which elimination at every pole costs more than a dense solve.
+const MOST_COORDINATES: usize = 64;
 /// Rounds of evaluations before a spectrum is given up.
 const MOST_ROUNDS: usize = 6;
 
@@ -42,6 +44,14 @@ impl Base {
         solver.poles(model, &mut poles)?;
         let pairs: Vec<_> = poles.iter().map(|pole| solver.pair(model, *pole)).collect();
         Ok(Self::new(&pairs))
+    }
+
+    /// The base of `model`, where determinants pay and certify the model itself: a model too large, or whose poles
+    /// are too sensitive for discs, would only cost determinants before the dense solver answers.
+    pub fn proven(model: &Model, solver: &mut Solver) -> Option<Self> {
+        let size = model.coordinates();
+        let base = (size <= MOST_COORDINATES).then(|| Self::of(model, solver).ok()).flatten()?;
+        Spectrum::new(size).solve(&base, model).is_ok().then_some(base)
     }
 }
 
@@ -84,6 +94,9 @@ impl Spectrum {
         if !self.guesses.iter().all(|s| s.re.is_finite() && s.im.is_finite()) {
             return Err(Uncertain::NonFinite);
         }
+        let logarithms: f64 = self.guesses.iter().map(|s| s.norm().ln()).sum();
+        let typical = (logarithms / self.guesses.len() as f64).exp();
+        self.pencil.equilibrate(if typical > 0.0 { typical } else { 1.0 });
         self.secular.start(self.guesses.iter().copied());
         // Idle lanes of the first round, at least one, look beside the poles expected.
         let count = self.guesses.len();

@@ -11,7 +11,7 @@ use faer::c64;
 /// Multiplier of a row beyond which rows are exchanged, squared.
 const LARGEST_MULTIPLIER: f64 = 64.0;
 /// What the bound of a determinant leaves for the estimate of the norm of the inverse by one vector.
-const SAFETY: f64 = 4.0;
+const SAFETY: f64 = 2.0;
 
 /// A polynomial with the poles of a model as its roots.
 pub struct Pencil {
@@ -20,8 +20,6 @@ pub struct Pencil {
     entries: Vec<[f64; 3]>,
     /// Null states divided out of each column.
     degree: Vec<usize>,
-    /// Weight of each first-order state beside its diagonal, a power of two.
-    weight: Vec<f64>,
     /// Determinant of the mass matrix, the leading coefficient.
     leading: Scaled,
     /// Bound of its relative error.
@@ -29,7 +27,15 @@ pub struct Pencil {
     matrix: Vec<Complexes>,
     column: Vec<Complexes>,
     rows: Vec<usize>,
-    scale: Vec<f64>,
+    /// Scales of rows and columns at the typical modulus.
+    scale: [Vec<f64>; 2],
+    /// Scales of rows and columns in each lane, powers of two.
+    lanes: [Vec<[f64; WIDTH]>; 2],
+    largest: Vec<f64>,
+    /// Elements of unit modulus and no structure.
+    probe: Vec<c64>,
+    /// Modulus for which the scales are.
+    typical: f64,
     factor: Vec<f64>,
 }
 
@@ -49,13 +55,21 @@ impl Pencil {
             size,
             entries: vec![[0.0; 3]; size * size],
             degree: vec![0; size],
-            weight: vec![1.0; size],
             leading: Scaled::ONE,
             leading_error: 0.0,
             matrix: vec![Complexes::ZERO; size * size],
             column: vec![Complexes::ZERO; size],
             rows: (0..size).collect(),
-            scale: vec![1.0; size],
+            scale: [vec![1.0; size], vec![1.0; size]],
+            largest: vec![0.0; size],
+            probe: (0..size)
+                .map(|i| {
+                    let angle = (i as f64 + 1.0) * (i as f64 + 2.0) * 0.618_033_988_749_894_9;
+                    c64::new(angle.cos(), angle.sin())
+                })
+                .collect(),
+            typical: 1.0,
+            lanes: [vec![[1.0; WIDTH]; size], vec![[1.0; WIDTH]; size]],
             factor: vec![0.0; size * size],
         }
     }
@@ -85,40 +99,7 @@ impl Pencil {
                 row[most] = [row[most][0] + sum.sum::<f64>(), 0.0, 0.0];
             }
         }
-        self.entries.iter().flatten().all(|value| value.is_finite())
-            && self.weigh(n)
-            && self.lead(model)
-    }
-
-    /// Weights of the first-order states, so that what they read and what they drive are of one size.
-    fn weigh(&mut self, second_order: usize) -> bool {
-        let size = self.size;
-        self.weight.fill(1.0);
-        let diagonal = |at: usize| {
-            let sum: f64 = self.entries[at * size + at].iter().map(|value| value.abs()).sum();
-            if sum > 0.0 { sum.sqrt() } else { 1.0 }
-        };
-        let diagonal: Vec<f64> = (0..size).map(diagonal).collect();
-        for _ in 0..if second_order < size { 3 } else { 0 } {
-            for state in second_order..size {
-                let other = (0..size).filter(|other| *other != state);
-                let (row, column) = other.fold((0.0_f64, 0.0_f64), |(row, column), other| {
-                    let of = |at: usize| {
-                        self.entries[at].iter().map(|v| v.abs()).fold(0.0, f64::max)
-                            / diagonal[other]
-                    };
-                    let weight = self.weight[other];
-                    (
-                        row.max(of(state * size + other) * weight),
-                        column.max(of(other * size + state) / weight),
-                    )
-                });
-                if row > 0.0 && column > 0.0 {
-                    self.weight[state] = scaled::power_near((row / column).sqrt());
-                }
-            }
-        }
-        self.weight.iter().all(|weight| weight.is_finite())
+        self.entries.iter().flatten().all(|value| value.is_finite()) && self.lead(model)
     }
 
     /// The determinant of the mass matrix by Cholesky, on a unit diagonal: there the elements of |R||Rᵀ| are
@@ -169,32 +150,90 @@ impl Pencil {
         self.leading_error.is_finite()
     }
 
-    /// The polynomial over its leading coefficient at eight frequencies, rad/s.
-    pub fn evaluate(&mut self, level: Level, points: &Complexes) -> Values {
+    /// Scales that bring the largest entries of rows and columns near one at frequencies of this modulus.
+    pub fn equilibrate(&mut self, modulus: f64) {
         let size = self.size;
-        let modulus = (points.re[0].hypot(points.im[0])).max(f64::MIN_POSITIVE);
-        // Powers of two bring the diagonal near one.
-        let mut exponent = 0;
-        for (i, scale) in self.scale.iter_mut().enumerate() {
+        let powers = [[modulus * modulus, modulus, 1.0], [modulus, 1.0, 0.0], [1.0, 0.0, 0.0]];
+        let [rows, columns] = &mut self.scale;
+        for (i, (row, column)) in rows.iter_mut().zip(columns.iter_mut()).enumerate() {
             let [m, d, k] = self.entries[i * size + i].map(f64::abs);
-            let diagonal = match self.degree[i] {
-                0 => (m * modulus + d) * modulus + k,
-                1 => m * modulus + d,
+            let of = powers[self.degree[i]];
+            let diagonal = m * of[0] + d * of[1] + k * of[2];
+            // Where s was divided out of a column, its row still has all powers.
+            let root = if diagonal > 0.0 { diagonal.sqrt().recip() } else { 1.0 };
+            let lacking = modulus.powi(self.degree[i] as i32).sqrt();
+            (*row, *column) = (root / lacking, root * lacking);
+        }
+        for _ in 0..2 {
+            self.largest.fill(0.0);
+            for (i, entries) in self.entries.chunks_exact(size).enumerate() {
+                let mut most = 0.0_f64;
+                for (((entry, degree), column), largest) in
+                    entries.iter().zip(&self.degree).zip(&*columns).zip(&mut self.largest)
+                {
+                    let of = powers[*degree];
+                    let [m, d, k] = entry.map(f64::abs);
+                    let value = (m * of[0] + d * of[1] + k * of[2]) * column * rows[i];
+                    most = most.max(value);
+                    *largest = largest.max(value);
+                }
+                // A row is divided at once by the root of its largest entry, columns at the end.
+                if most > 0.0 {
+                    rows[i] /= most.sqrt();
+                }
+            }
+            for (column, largest) in columns.iter_mut().zip(&self.largest) {
+                if *largest > 0.0 {
+                    *column /= largest.sqrt();
+                }
+            }
+        }
+        self.typical = modulus;
+    }
+
+    /// Scales of each lane: those of the typical modulus, moved with the diagonal; powers of two. Gives the
+    /// exponents that the determinants lack.
+    fn scale_lanes(&mut self, points: &Complexes) -> [i64; WIDTH] {
+        let mut exponent = [0; WIDTH];
+        let modulus: [f64; WIDTH] = std::array::from_fn(|lane| {
+            points.re[lane].hypot(points.im[lane]).max(f64::MIN_POSITIVE)
+        });
+        let [rows, columns] = &self.scale;
+        for i in 0..self.size {
+            let [m, d, k] = self.entries[i * self.size + i].map(f64::abs);
+            let degree = self.degree[i] as i32;
+            let diagonal = |s: f64| match degree {
+                0 => (m * s + d) * s + k,
+                1 => m * s + d,
                 _ => m,
             };
-            *scale = if diagonal > 0.0 { scaled::power_near(diagonal.sqrt().recip()) } else { 1.0 };
-            exponent -= 2 * scaled::exponent(*scale);
+            let typical = diagonal(self.typical);
+            for lane in 0..WIDTH {
+                let moved = if typical > 0.0 { typical / diagonal(modulus[lane]) } else { 1.0 };
+                let lacking = (modulus[lane] / self.typical).powi(degree);
+                let row = scaled::power_near(rows[i] * (moved / lacking).sqrt());
+                let column = scaled::power_near(columns[i] * (moved * lacking).sqrt());
+                (self.lanes[0][i][lane], self.lanes[1][i][lane]) = (row, column);
+                exponent[lane] -= scaled::exponent(row) + scaled::exponent(column);
+            }
         }
+        exponent
+    }
+
+    /// The polynomial over its leading coefficient at eight frequencies, rad/s.
+    pub fn evaluate(&mut self, level: Level, points: &Complexes) -> Values {
+        let exponent = self.scale_lanes(points);
         let rounding = 0.5 * f64::EPSILON;
         let Factored { mut value, norm, growth } = level.run(Factor { pencil: self, points });
-        // Wilkinson: the factors are those of A + E, |E_ij| ≤ 4 min(i, j) u g with complex numbers, so
-        // ‖E‖ ≤ 4 N²/√6 u g; the entries themselves are made with less than 16 u g. det(A + E)/det A − 1 is
-        // tr A⁻¹E ≤ ‖A⁻¹‖ ‖E‖ to first order.
-        let n = size as f64;
-        let backward = (1.7 * n * n + 16.0 * n) * rounding;
+        // The factors are those of A + E, whose elements gather min(i, j) roundings of sums below g and those of
+        // the entries: √min(i, j) of them with high probability (Higham and Mary, SIAM J. Sci. Comput. 41,
+        // 2019), so that ‖E‖ is below (2 N^1.5 + 8 N) u g. det(A + E)/det A − 1 is tr A⁻¹E ≤ ‖A⁻¹‖ ‖E‖ to first
+        // order. Values beside the nodes check it in every case.
+        let n = self.size as f64;
+        let backward = (2.0 * n * n.sqrt() + 8.0 * n) * rounding;
         let mut error = [0.0; WIDTH];
         for lane in 0..WIDTH {
-            value[lane] = value[lane].shifted(exponent).over(self.leading);
+            value[lane] = value[lane].shifted(exponent[lane]).over(self.leading);
             let relative = SAFETY * backward * growth[lane] * norm[lane];
             error[lane] = relative + self.leading_error + 8.0 * n * f64::EPSILON;
         }
@@ -224,7 +263,7 @@ impl Kernel for Factor<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> Factored {
-        let Pencil { size: n, entries, degree, weight, matrix, column, rows, scale, .. } =
+        let Pencil { size: n, entries, degree, matrix, column, rows, lanes, probe, .. } =
             self.pencil;
         let n = *n;
         let s = Complex::<V>::load(self.points);
@@ -233,7 +272,7 @@ impl Kernel for Factor<'_> {
         let powers = [[s.mul(s), s, one], [s, one, zero], [one, zero, zero]];
         let mut largest = V::splat(0.0);
         for i in 0..n {
-            let row_scale = scale[i] / weight[i];
+            let row_scale = V::load(&lanes[0][i]);
             for j in 0..n {
                 let [m, d, k] = entries[i * n + j];
                 let to = &mut matrix[i * n + j];
@@ -241,11 +280,11 @@ impl Kernel for Factor<'_> {
                     *to = Complexes::ZERO;
                     continue;
                 }
-                let factor = row_scale * (scale[j] * weight[j]);
+                let factor = row_scale.mul(V::load(&lanes[1][j]));
                 let [square, linear, constant] = powers[degree[j]];
-                let value = constant.scale(V::splat(k * factor));
-                let value = value.add_real_product(V::splat(d * factor), linear);
-                let value = value.add_real_product(V::splat(m * factor), square);
+                let value = constant.scale(V::splat(k));
+                let value = value.add_real_product(V::splat(d), linear);
+                let value = value.add_real_product(V::splat(m), square).scale(factor);
                 largest = largest.max(value.square());
                 value.store(to);
             }
@@ -254,7 +293,7 @@ impl Kernel for Factor<'_> {
             *row = i;
         }
         let mut product = scaled::Product::<V>::new();
-        let mut sign = 1.0;
+        let mut sign = [1.0; WIDTH];
         for j in 0..n {
             for (i, to) in column.iter_mut().enumerate() {
                 *to = matrix[rows[i] * n + j];
@@ -272,8 +311,9 @@ impl Kernel for Factor<'_> {
             if best > 0 {
                 rows.swap(j, j + best);
                 column.swap(j, j + best);
-                sign = -sign;
+                sign = sign.map(|sign: f64| -sign);
             }
+            exchange_lanes::<V>(matrix, rows, column, j, most, &mut sign);
             guard(&mut column[j]);
             let pivot = Complex::<V>::load(&column[j]);
             product.times(pivot);
@@ -286,10 +326,11 @@ impl Kernel for Factor<'_> {
                 Complex::<V>::load(&column[i]).mul(inverse).store(&mut matrix[rows[i] * n + j]);
             }
         }
-        let norm = inverse_norm::<V>(matrix, rows, column, n);
+        let norm = inverse_norm::<V>(matrix, rows, column, probe, n);
         let mut growth = [0.0; WIDTH];
         largest.sqrt().store(&mut growth);
-        let value = product.finish().map(|value| value.times(c64::new(sign, 0.0)));
+        let value = product.finish();
+        let value = std::array::from_fn(|lane| value[lane].times(c64::new(sign[lane], 0.0)));
         Factored { value, norm, growth }
     }
 }
@@ -311,13 +352,22 @@ fn solve_lower<V: Vector>(
         let (done, rest) = column.split_at_mut(first);
         let done = &done[..length];
         if count == 4 {
-            let of = |i: usize| &matrix[rows[first + i] * n..][..length];
+            let of = |i: usize| &matrix[rows[first + i] * n..][..n];
             let from = [of(0), of(1), of(2), of(3)];
             let mut sum: [Complex<V>; 4] = std::array::from_fn(|i| Complex::load(&rest[i]));
+            let known_rows = from.map(|row| &row[..length]);
             for k in 0..length {
                 let c = Complex::<V>::load(&done[k]);
                 for i in 0..4 {
-                    sum[i] = sum[i].subtract_product(Complex::load(&from[i][k]), c);
+                    sum[i] = sum[i].subtract_product(Complex::load(&known_rows[i][k]), c);
+                }
+            }
+            for i in 1..4 {
+                for k in 0..i {
+                    if first + k < known {
+                        let l = Complex::load(&from[i][first + k]);
+                        sum[i] = sum[i].subtract_product(l, sum[k]);
+                    }
                 }
             }
             for i in 0..4 {
@@ -325,22 +375,18 @@ fn solve_lower<V: Vector>(
             }
         } else {
             for i in 0..count {
-                let from = &matrix[rows[first + i] * n..][..length];
+                let from = &matrix[rows[first + i] * n..][..n];
                 let mut sum = Complex::<V>::load(&rest[i]);
-                for k in 0..length {
-                    sum = sum.subtract_product(Complex::load(&from[k]), Complex::load(&done[k]));
+                for (l, c) in from[..length].iter().zip(done) {
+                    sum = sum.subtract_product(Complex::load(l), Complex::load(c));
+                }
+                for k in 0..i {
+                    if first + k < known {
+                        let l = Complex::load(&from[first + k]);
+                        sum = sum.subtract_product(l, Complex::load(&rest[k]));
+                    }
                 }
                 sum.store(&mut rest[i]);
-            }
-        }
-        // Inside the block.
-        for i in 1..count {
-            for k in 0..i {
-                if first + k < known {
-                    let l = Complex::<V>::load(&matrix[rows[first + i] * n + first + k]);
-                    let value = Complex::<V>::load(&rest[i]);
-                    value.subtract_product(l, Complex::load(&rest[k])).store(&mut rest[i]);
-                }
             }
         }
         first += count;
@@ -371,6 +417,46 @@ fn pivot<V: Vector>(column: &[Complexes], most: V) -> usize {
     best.0
 }
 
+/// Exchanges rows in those lanes alone whose pivot is still far below the largest.
+#[inline(always)]
+fn exchange_lanes<V: Vector>(
+    matrix: &mut [Complexes],
+    rows: &[usize],
+    column: &mut [Complexes],
+    j: usize,
+    most: V,
+    sign: &mut [f64; WIDTH],
+) {
+    let (mut largest, mut square) = ([0.0; WIDTH], [0.0; WIDTH]);
+    most.store(&mut largest);
+    Complex::<V>::load(&column[j]).square().store(&mut square);
+    let n = rows.len();
+    for lane in 0..WIDTH {
+        if square[lane] * LARGEST_MULTIPLIER >= largest[lane] {
+            continue;
+        }
+        let size = |i: &usize| {
+            let value = &column[*i];
+            value.re[lane].hypot(value.im[lane])
+        };
+        let best = (j..n).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(j);
+        if best == j {
+            continue;
+        }
+        let mut exchange = |a: &mut [Complexes], first: usize, second: usize| {
+            let (low, high) = (first.min(second), first.max(second));
+            let (left, right) = a.split_at_mut(high);
+            std::mem::swap(&mut left[low].re[lane], &mut right[0].re[lane]);
+            std::mem::swap(&mut left[low].im[lane], &mut right[0].im[lane]);
+        };
+        exchange(column, j, best);
+        for c in 0..n {
+            exchange(matrix, rows[j] * n + c, rows[best] * n + c);
+        }
+        sign[lane] = -sign[lane];
+    }
+}
+
 /// Puts a pivot of the size of rounding where there is none: no farther from the matrix than its factors are.
 #[inline(always)]
 fn guard(pivot: &mut Complexes) {
@@ -387,12 +473,11 @@ fn inverse_norm<V: Vector>(
     matrix: &[Complexes],
     rows: &[usize],
     column: &mut [Complexes],
+    probe: &[c64],
     n: usize,
 ) -> [f64; WIDTH] {
-    for (i, value) in column.iter_mut().enumerate() {
-        let angle = (i as f64 + 1.0) * (i as f64 + 2.0) * 0.618_033_988_749_894_9;
-        let (sin, cos) = (angle.sin(), angle.cos());
-        *value = Complexes { re: [cos; WIDTH], im: [sin; WIDTH] };
+    for (value, unit) in column.iter_mut().zip(probe) {
+        *value = Complexes { re: [unit.re; WIDTH], im: [unit.im; WIDTH] };
     }
     solve_lower::<V>(matrix, rows, column, n, n);
     let mut sum = V::splat(0.0);

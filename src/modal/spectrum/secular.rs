@@ -20,12 +20,17 @@ const MOST_SWEEPS: usize = 30;
 const RESTED: f64 = 1e-13;
 /// Relative step above which a root that does not come to rest may have changed its kind.
 const ADRIFT: f64 = 1e-4;
-/// Relative distance below which nodes are moved apart.
-const COINCIDENT: f64 = 1e-4;
+/// Relative distance below which guesses are moved apart.
+const APART: f64 = 1e-4;
+/// Relative distance of roots that may be one repeated root; they become nodes in every round, which draws
+/// nearer to it each time.
+const CROWDED: f64 = 1e-3;
 /// Bound, in units of the modulus, above which a root becomes a node.
 const UNCERTAIN: f64 = 1e-11;
-/// Bound, in units of the modulus, above which a disc of several roots proves nothing of use.
-const LARGEST_CLUSTER: f64 = 1e-6;
+/// Bound above which a disc proves nothing of use: in units of the modulus of the root …
+const LARGEST_BOUND: f64 = 1e-6;
+/// … or, for slow roots among fast ones, of the geometric mean of all moduli.
+const LARGEST_OF_ALL: f64 = 1e-8;
 
 /// A root, real or with its conjugate: the slot of its own node, and that of its conjugate.
 #[derive(Debug, Clone, Copy)]
@@ -112,9 +117,10 @@ impl Secular {
         self.lane.resize(degree, NO_LANE);
         self.radius.clear();
         self.radius.resize(self.roots.len(), f64::INFINITY);
-        self.separate();
+        self.part(APART);
         self.pending.clear();
         self.pending.extend(0..self.roots.len());
+        self.renew();
     }
 
     /// Number of roots, conjugates included.
@@ -122,34 +128,55 @@ impl Secular {
         self.node.len()
     }
 
-    /// Moves nodes apart that nearly coincide.
-    fn separate(&mut self) {
-        let mut order: Vec<usize> = (0..self.roots.len()).collect();
-        let key = |k: &usize| self.node[self.roots[*k].own];
-        order.sort_by(|a, b| {
-            let (a, b) = (key(a), key(b));
-            a.im.total_cmp(&b.im).then(a.re.total_cmp(&b.re))
-        });
-        for position in 0..order.len() {
-            let root = self.roots[order[position]];
+    /// Roots in the order of their imaginary, then real parts, with their values.
+    fn sorted(&self) -> Vec<(usize, c64)> {
+        let all = self.roots.iter().enumerate();
+        let mut order: Vec<(usize, c64)> = all.map(|(i, root)| (i, self.at(root.own))).collect();
+        order.sort_by(|(_, a), (_, b)| a.im.total_cmp(&b.im).then(a.re.total_cmp(&b.re)));
+        order
+    }
+
+    /// Moves guesses apart that are nearer than `least` of their modulus.
+    fn part(&mut self, least: f64) {
+        let order = self.sorted();
+        for (position, &(index, _)) in order.iter().enumerate() {
+            let root = self.roots[index];
             // A few neighbours above are enough: farther ones differ in their imaginary part.
-            for &other in order[position + 1..].iter().take(4) {
-                let other = self.roots[other];
+            for &(second, _) in order[position + 1..].iter().take(4) {
+                let other = self.roots[second];
                 if root.partner.is_some() != other.partner.is_some() {
                     continue;
                 }
-                let (a, b) = (self.node[root.own], self.node[other.own]);
-                let least = COINCIDENT * a.norm().max(b.norm());
-                if (a - b).norm() < least {
-                    let step =
-                        if other.partner.is_some() { c64::new(0.0, least) } else { least.into() };
-                    self.node[other.own] += step * 1.5;
+                let (a, b) = (self.at(root.own), self.at(other.own));
+                let distance = least * a.norm().max(b.norm());
+                if (a - b).norm() < distance {
+                    let pair = other.partner.is_some();
+                    let step = if pair { c64::new(0.0, distance) } else { distance.into() };
+                    self.offset[other.own] += step * 1.5;
                     if let Some(partner) = other.partner {
-                        self.node[partner] = self.node[other.own].conj();
+                        self.offset[partner] = self.at(other.own).conj() - self.node[partner];
                     }
                 }
             }
         }
+    }
+
+    /// Per root, whether another is very near.
+    fn crowded(&self) -> Vec<bool> {
+        let order = self.sorted();
+        let mut crowded = vec![false; order.len()];
+        for (position, &(index, a)) in order.iter().enumerate() {
+            for &(second, b) in &order[position + 1..] {
+                let distance = CROWDED * a.norm();
+                if b.im - a.im > distance {
+                    break;
+                }
+                if (a - b).norm() <= distance {
+                    (crowded[index], crowded[second]) = (true, true);
+                }
+            }
+        }
+        crowded
     }
 
     /// Nodes at which p is to be evaluated, those of the roots [`Secular::pending`].
@@ -189,9 +216,13 @@ impl Secular {
             }
         }
         self.measure(level);
+        let crowded = self.crowded();
         self.pending.clear();
         for (index, root) in self.roots.iter().enumerate() {
-            if !(self.radius[index] <= UNCERTAIN * self.at(root.own).norm()) {
+            let radius = self.radius[index];
+            // A node as near as that has its own rounding only, and would have it again.
+            let far = !(self.offset[root.own].norm() <= 0.1 * radius);
+            if (far || crowded[index]) && !(radius <= UNCERTAIN * self.at(root.own).norm()) {
                 self.pending.push(index);
             }
         }
@@ -394,6 +425,8 @@ impl Secular {
             }
             near[i] |= x.im > 0.0 && !(2.0 * degree * r < x.im);
         }
+        let logarithms: f64 = discs.iter().map(|disc| disc.0.norm().ln()).sum();
+        let mean = (logarithms / discs.len().max(1) as f64).exp();
         let clustered = (0..discs.len()).any(|i| cluster[i] != i);
         for (i, &(x, r, v)) in discs.iter().enumerate() {
             let members = || (0..discs.len()).filter(|j| cluster[*j] == cluster[i]);
@@ -407,7 +440,7 @@ impl Secular {
             };
             // A pair whose discs meet each other across the axis may be two real roots.
             let certain = x.im == 0.0 || bound < x.im;
-            if !(certain && bound <= LARGEST_CLUSTER * x.norm()) {
+            if !(certain && bound <= (LARGEST_BOUND * x.norm()).max(LARGEST_OF_ALL * mean)) {
                 return Err(Uncertain::Unresolved);
             }
             found.push(Bounded { root: x, bound, multiplicity });
