@@ -24,9 +24,14 @@ const FILES: &[(&str, &[u8])] = embedded![
     "vehicles/sls-like/modes/tables/parents.parquet",
     "vehicles/sls-like/modes/tables/shapes.parquet",
     "dispersions/reference.toml",
+    "dispersions/closed-loop.toml",
     "runs/reference.toml",
     "runs/reference.gates.toml",
     "runs/all-engines.toml",
+    "runs/closed-loop.toml",
+    "runs/closed-loop.gates.toml",
+    "runs/plant.toml",
+    "runs/regression.gates.toml",
     "runs/smoke.toml",
 ];
 
@@ -52,7 +57,8 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let target = place.path().join("study");
         let paths = write(&target).unwrap();
-        for run in ["runs/reference.toml", "runs/all-engines.toml", "runs/smoke.toml"] {
+        for run in ["reference", "all-engines", "closed-loop", "plant", "smoke"] {
+            let run = &*format!("runs/{run}.toml");
             assert!(paths.contains(&run));
             let loaded = scenario::load(&target.join(run), scenario::Reach::Study).unwrap();
             assert_eq!(loaded.vehicle.vehicle.name, "SLS-like, synthetic");

@@ -11,6 +11,7 @@ mod corpus;
 mod damage;
 mod derivatives;
 mod failures;
+mod gates;
 mod import;
 mod outside;
 mod parsers;
