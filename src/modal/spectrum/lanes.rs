@@ -57,6 +57,7 @@ pub struct Complex<V> {
     pub im: V,
 }
 
+#[expect(clippy::should_implement_trait, reason = "the names of `Vector`, all inlined")]
 impl<V: Vector> Complex<V> {
     /// From memory.
     #[inline(always)]

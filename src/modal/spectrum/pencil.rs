@@ -443,7 +443,7 @@ fn exchange_lanes<V: Vector>(
         if best == j {
             continue;
         }
-        let mut exchange = |a: &mut [Complexes], first: usize, second: usize| {
+        let exchange = |a: &mut [Complexes], first: usize, second: usize| {
             let (low, high) = (first.min(second), first.max(second));
             let (left, right) = a.split_at_mut(high);
             std::mem::swap(&mut left[low].re[lane], &mut right[0].re[lane]);

@@ -102,10 +102,10 @@ impl<V: Vector> Product<V> {
         let mut value = Complexes::ZERO;
         self.value.store(&mut value);
         let mut factor = [1.0; WIDTH];
-        for lane in 0..WIDTH {
+        for (lane, factor) in factor.iter_mut().enumerate() {
             let size = value.re[lane].abs().max(value.im[lane].abs());
             let power = exponent(size).clamp(-1000, 1000);
-            factor[lane] = power_of_two(-power);
+            *factor = power_of_two(-power);
             self.exponent[lane] += power;
         }
         self.value = self.value.scale(V::load(&factor));
