@@ -33,7 +33,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let definition = &loaded.definition;
     let sampler = loaded.sampler(definition)?;
     let evaluator = Evaluator::new(&loaded.vehicle.vehicle, &sampler, definition, false)?;
-    println!("variant,flight_time_s,case,states,file,structured_s,dense_s,determinants,poles,bound");
+    println!(
+        "variant,flight_time_s,case,states,file,structured_s,dense_s,determinants,poles,bound"
+    );
     for case in 0..cases.parse()? {
         let mut failed = None;
         evaluator.visit(1, case, |view| {
