@@ -196,6 +196,7 @@ fn guarded(
             let plan = definition.margins.as_ref();
             (0..definition.variants.len()).map(move |variant| Evaluation {
                 null_poles: 0,
+                solution: None,
                 variant,
                 flight_time,
                 outcome: Err(failure.clone()),
