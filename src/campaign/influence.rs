@@ -26,8 +26,6 @@ pub struct Influence {
     pub standard_deviation: Option<f64>,
     /// Share of the variance that is linear in the score.
     pub share: Option<f64>,
-    /// Its interval, from that of the mean; the variance's own error is left out.
-    pub share_interval: Option<[f64; 2]>,
     /// Upper bound of the total index.
     pub total_bound: Option<f64>,
 }
@@ -89,10 +87,6 @@ impl Influences {
             let mean_interval = interval(signed);
             let standard_deviation = moments.standard_deviation();
             let spread = standard_deviation.unwrap_or(0.0);
-            let square = |[low, high]: [f64; 2]| {
-                let (a, b) = (low * low, high * high);
-                [if low * high <= 0.0 { 0.0 } else { a.min(b) }, a.max(b)]
-            };
             all.push(Influence {
                 draw,
                 mean,
@@ -101,8 +95,6 @@ impl Influences {
                 mean_modulus_interval: interval(modulus),
                 standard_deviation,
                 share: variance.map(|variance| mean * mean / variance),
-                share_interval: variance
-                    .and_then(|variance| Some(square(mean_interval?).map(|end| end / variance))),
                 total_bound: variance.map(|variance| (mean * mean + spread * spread) / variance),
             });
         }
@@ -155,7 +147,7 @@ mod tests {
     #[test]
     fn cases_that_are_no_independent_draws_have_no_intervals() {
         for influence in influences().ranking(Drawing::Selected) {
-            assert_eq!((influence.mean_interval, influence.share_interval), (None, None));
+            assert_eq!((influence.mean_interval, influence.mean_modulus_interval), (None, None));
         }
         assert!(influences().ranking(Drawing::Independent)[2].mean_interval.is_some());
     }

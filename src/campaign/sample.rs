@@ -77,7 +77,7 @@ impl Sample {
 
     /// Cases of an outer draw of a nested plan, and the share of bad ones that it may have with the
     /// risk of saying so.
-    pub(super) fn nested(&self) -> Option<(u64, f64, f64)> {
+    pub fn nested(&self) -> Option<(u64, f64, f64)> {
         match (self.clusters, self.statement) {
             (Clusters::Rows(inner), Some((allowed, risk))) => Some((inner as u64, allowed, risk)),
             _ => None,

@@ -6,7 +6,7 @@ use crate::campaign::worst::{Aim, Objective, Quantity};
 use crate::campaign::{Branch, Evaluator, Sample};
 use crate::io::{Run, inputs};
 use crate::problem::Problems;
-use crate::report::influence::{Tornado, rows, text};
+use crate::report::influence::{Ranking, Tornado, rows, text};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,8 @@ use std::path::{Path, PathBuf};
 /// each key alone at its low and high place for a tornado chart.
 ///
 /// Shares count the variance of the damping ratio that is linear in a key; the bound is one of its total
-/// index. `tvse sensitivity` gives indices from the sample itself.
+/// index. `tvse sensitivity` gives indices from the sample itself. All numbers go to analysis/influence.csv
+/// in the run's folder.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -43,7 +44,7 @@ pub struct Args {
     /// Low and high place of the tornado chart, in σ
     #[arg(long, value_name = "N", default_value_t = 3.0)]
     sigma: f64,
-    /// File for all numbers of a single ranking as CSV; it must not exist
+    /// File for a copy of the table with all numbers, as CSV; it must not exist
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -84,18 +85,16 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         }
         Ok(())
     })?;
-    if all.is_empty() || (args.output.is_some() && all.len() != 1) {
-        let message = format!(
-            "found {} rankings; allowed: {} (--variant, --time, --mode choose)",
-            all.len(),
-            if args.output.is_some() { "one for --output" } else { "at least one" }
-        );
-        return Err(Error::Usage(message));
+    if all.is_empty() {
+        let message = "found no ranking; allowed: --variant, --time and --mode with derivatives";
+        return Err(Error::Usage(message.to_owned()));
     }
     let loaded = inputs::read(&args.run, &outline.inputs)?;
     let sampler = loaded.sampler(definition)?;
     let evaluator = Evaluator::new(&loaded.vehicle.vehicle, &sampler, definition, false)
         .map_err(|error| unprepared(Path::new(&loaded.run.0), &error))?;
+    let drawing = Sample::of(of).drawing();
+    let mut rankings = Vec::new();
     for (key, influences) in &all {
         let [variant, flight_time, mode] = *key;
         let objective = Objective {
@@ -104,7 +103,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
             aim: Aim { variant, baseline: None, mode, quantity: Quantity::DampingRatio },
             flight_time,
         };
-        let ranking = influences.ranking(Sample::of(of).drawing());
+        let ranking = influences.ranking(drawing);
         let with_tornado = |(place, influence): (usize, Influence)| {
             let solved = |sigma: f64| {
                 let mut z = vec![None; outline.draws.len()];
@@ -116,20 +115,32 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
             let tornado: Tornado = if shown { ends() } else { None };
             (influence, tornado)
         };
-        let ranking: Vec<(Influence, Tornado)> =
-            ranking.into_iter().enumerate().map(with_tornado).collect();
+        let ranking = Ranking {
+            variant: &definition.variants[variant].name,
+            flight_time_s: definition.flight_times_s[flight_time],
+            mode: &definition.modes[mode],
+            nominal: objective.value(&vec![None; outline.draws.len()]).ok(),
+            sigma: args.sigma,
+            all: ranking.into_iter().enumerate().map(with_tornado).collect(),
+        };
         writeln!(
             out,
             "{} at {} s, mode {}: {} cases, {} near veering; ζ at ∓{} σ of one key, all else nominal",
-            definition.variants[variant].name,
-            definition.flight_times_s[flight_time],
-            definition.modes[mode],
+            ranking.variant,
+            ranking.flight_time_s,
+            ranking.mode,
             influences.cases,
             influences.veering,
             args.sigma
         )?;
-        writeln!(out, "{}", text(&outline.draws, &ranking[..args.top.min(ranking.len())]))?;
-        selection::write(args.output.as_deref(), &rows(&outline.draws, &ranking))?;
+        let shown = &ranking.all[..args.top.min(ranking.all.len())];
+        writeln!(out, "{}", text(&outline.draws, shown))?;
+        rankings.push(ranking);
     }
+    if let Err(refused) = drawing.independent() {
+        writeln!(out, "no intervals: {refused}")?;
+    }
+    let rows = rows(&outline.draws, &rankings);
+    selection::keep(&args.run, "influence.csv", args.output.as_deref(), &rows, out)?;
     Ok(PASS)
 }

@@ -46,6 +46,22 @@ pub fn values(run: &Run, population: usize, names: &[String]) -> Result<Vec<Vec<
     Ok(columns)
 }
 
+/// Writes a table to the folder `analysis` of a run, in place of the one of an earlier call, and to a new
+/// file if one is asked for; says where to.
+pub fn keep(
+    run: &Path,
+    name: &str,
+    copy: Option<&Path>,
+    rows: &Rows,
+    out: &mut dyn std::io::Write,
+) -> Result<(), Error> {
+    let path = run.join("analysis").join(name);
+    files::create_parents(&path)?;
+    files::write(&path, rows.csv().as_bytes())?;
+    writeln!(out, "{}", path.display())?;
+    write(copy, rows)
+}
+
 /// Writes a table to a new file, if one is asked for.
 pub fn write(path: Option<&Path>, rows: &Rows) -> Result<(), Error> {
     if let Some(path) = path {

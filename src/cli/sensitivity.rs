@@ -4,15 +4,16 @@ use super::{Error, PASS, selection};
 use crate::campaign::Sample;
 use crate::campaign::sensitivity::{Input, rank};
 use crate::io::Run;
-use crate::report::statistics::{ranking, ranking_text};
+use crate::report::statistics::{ranking_text, rankings};
 use std::path::PathBuf;
 
 /// Ranks the draws of a finished run by what they do to a metric, with 95 % intervals, and gives the data
 /// of a tornado chart.
 ///
 /// Independent draws: standardised regression coefficients, partial rank correlations and first-order
-/// indices from given data. Saltelli's plan: first-order and total indices. One-at-a-time plan: the values
-/// at the low and the high place of each key.
+/// indices from given data; of a Latin hypercube or Sobol points the same, with intervals over replicates.
+/// Saltelli's plan: first-order and total indices. One-at-a-time plan: the values at the low and the high
+/// place of each key. All numbers go to analysis/sensitivity.csv in the run's folder.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -34,7 +35,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 400,
         value_parser = clap::value_parser!(u32).range(200..=100_000))]
     resamples: u32,
-    /// File for all numbers of a single metric as CSV; it must not exist
+    /// File for a copy of the table with all numbers, as CSV; it must not exist
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -49,12 +50,6 @@ pub fn run(args: &Args, out: &mut dyn std::io::Write) -> Result<u8, Error> {
     let definition = &run.outline().definition;
     let population = selection::population(&run, &args.population)?;
     let names = selection::columns(&run, &args.metric)?;
-    if args.output.is_some() && names.len() != 1 {
-        let found = names.len();
-        return Err(Error::Usage(format!(
-            "--output: found {found} metrics; allowed: one --metric"
-        )));
-    }
     let draws = &run.outline().draws;
     let columns: Vec<String> = draws.iter().map(|draw| draw.column.clone()).collect();
     let inputs: Vec<Input> = selection::values(&run, population, &columns)?
@@ -64,11 +59,15 @@ pub fn run(args: &Args, out: &mut dyn std::io::Write) -> Result<u8, Error> {
         .collect();
     let of = &definition.populations[population];
     let resamples = args.resamples as usize;
+    let mut found = Vec::new();
     for (name, results) in names.iter().zip(selection::values(&run, population, &names)?) {
-        let found = rank(Sample::of(of), &of.scheme, &inputs, &results, resamples, definition.seed)
-            .map_err(|error| Error::Usage(format!("{name}: no index: {error}")))?;
-        writeln!(out, "{name}\n{}", ranking_text(&found, args.top))?;
-        selection::write(args.output.as_deref(), &ranking(&found))?;
+        let ranking =
+            rank(Sample::of(of), &of.scheme, &inputs, &results, resamples, definition.seed)
+                .map_err(|error| Error::Usage(format!("{name}: no index: {error}")))?;
+        writeln!(out, "{name}\n{}", ranking_text(&ranking, args.top))?;
+        found.push((name.as_str(), ranking));
     }
+    let rows = rankings(found.iter().map(|(name, ranking)| (*name, ranking)));
+    selection::keep(&args.run, "sensitivity.csv", args.output.as_deref(), &rows, out)?;
     Ok(PASS)
 }

@@ -11,7 +11,7 @@ use crate::io::replay::Replay;
 use crate::io::scenario::Loaded;
 use crate::io::worst::Found;
 use crate::io::{self, Run, files, inputs};
-use crate::report;
+use crate::report::{self, worst::Around};
 use crate::spelling::allowed_instead;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -29,7 +29,7 @@ Examples:
   tvse worst runs/reference --variant jet_damping
   tvse worst runs/reference --variant jet_damping --objective time-to-double --time 110 --corners 14
   tvse worst runs/closed --variant closed --baseline open
-  tvse worst runs/reference --variant jet_damping --output fixed.toml")]
+  tvse worst runs/reference --variant jet_damping --output fixed.toml --around 500")]
 pub struct Args {
     /// Folder of the run
     run: PathBuf,
@@ -67,6 +67,12 @@ pub struct Args {
     /// Threads (default: all processors); results do not depend on it
     #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
+    /// Fixed cases come with Monte Carlo of so many cases around each, all but the keys held being drawn
+    #[arg(long, value_name = "CASES")]
+    around: Option<u64>,
+    /// Keys held in that: those with the greatest shares of the objective
+    #[arg(long, value_name = "N", default_value_t = 10, requires = "around")]
+    hold: usize,
     /// File for the cases as fixed cases of a run file; it must not exist
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -159,10 +165,11 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let standing: Vec<Option<Standing>> =
         cases.iter().map(|case| Standing::of(case.objective, &values)).collect();
 
+    let around = args.around.map(|cases| Around { cases, held: args.hold });
     let texts = vec![
         ("worst.csv", report::worst::cases(definition, &cases, &standing).csv()),
         ("parameters.csv", report::worst::parameters(&outline.draws, &cases).csv()),
-        ("fixed.toml", report::worst::fixed(&outline.draws, &cases)),
+        ("fixed.toml", report::worst::fixed(&outline.draws, &cases, around)),
     ];
     if let Some(path) = &args.output {
         files::write(path, texts[2].1.as_bytes())?;
@@ -179,12 +186,17 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         "{} corners and {} points with derivatives evaluated; {} of {} descents ended at a stationary point",
         work.corners, work.evaluations, work.converged, work.descents
     )?;
+    for case in cases.iter().filter(|case| case.gap.is_some()) {
+        let gap = report::significant(case.gap.unwrap_or_default());
+        writeln!(out, "{}: at most {gap} more by the linear prediction", case.name)?;
+    }
     if let Err(refused) = Method::Box.drawing().independent() {
         writeln!(out, "no share, quantile or tolerance bound follows from these cases: {refused}")?;
     }
     let found = Found {
         run: outline.identity(),
         aim,
+        flight_times: plan.flight_times,
         box_sigma: args.sigma,
         radius_sigma: args.radius,
         cases,

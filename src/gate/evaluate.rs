@@ -7,9 +7,9 @@
 //! the order statistics of Wilks.
 
 use super::outcome::{Offender, Outcome};
-use super::resolve::{Claim, Plan, Run, column_unit, resolve};
+use super::resolve::{Claim, Outer, Plan, Run, column_unit, resolve};
 use super::rule::{Gate, Sense, Statistic};
-use super::source::{CaseValue, MissingMeans, Names, Query, Source, Worst};
+use super::source::{CaseValue, MissingMeans, Names, Query, Searched, Source, Worst};
 use super::verdict::Verdict;
 use crate::problem::Problems;
 use crate::stats::{self, Confidence, Probability, Selection, Sides, Tails};
@@ -43,9 +43,46 @@ fn worst(gate: &Gate) -> Worst {
         | (Statistic::ShareAbove { .. }, Sense::AtLeast) => Worst::Smallest,
         (Statistic::ShareBelow { .. }, Sense::AtLeast)
         | (Statistic::ShareAbove { .. }, Sense::AtMost) => Worst::Largest,
+        // A share of the inner cases.
+        (Statistic::NestedStatement { .. }, _) => Worst::Largest,
         (_, Sense::AtLeast) => Worst::Smallest,
         (_, Sense::AtMost) => Worst::Largest,
     }
+}
+
+/// Hands the cases of a gate to `visit`; of a nested plan one for each outer draw that is whole, called by
+/// its first case, with the share of its cases that are bad: below the threshold, failed or without a value.
+fn values(
+    gate: &Gate,
+    plan: &Plan<'_>,
+    source: &impl Source,
+    query: &Query<'_>,
+    visit: &mut dyn FnMut(CaseValue) -> Result<(), Problems>,
+) -> Result<(), Problems> {
+    let (
+        Statistic::NestedStatement { threshold, .. },
+        Claim::Share { outer: Some(Outer { inner, .. }), .. },
+    ) = (&gate.statistic, &plan.claim)
+    else {
+        return source.visit(query, visit);
+    };
+    let good = |value: &Result<Option<f64>, String>| match value {
+        Ok(Some(value)) => *value >= threshold.base(),
+        Ok(None) => plan.metric.missing == MissingMeans::NotApplicableGood,
+        Err(_) => false,
+    };
+    let (mut first, mut present, mut bad) = (0, 0, 0_u64);
+    source.visit(query, &mut |case| {
+        if case.case / inner != first / inner {
+            (first, present, bad) = (case.case / inner * inner, 0, 0);
+        }
+        present += 1;
+        bad += u64::from(!good(&case.value));
+        if present < *inner {
+            return Ok(());
+        }
+        visit(CaseValue { case: first, value: Ok(Some(bad as f64 / *inner as f64)) })
+    })
 }
 
 /// Whether a value counts against the gate; written so that NaN does.
@@ -111,7 +148,7 @@ impl Cases {
             Self { count: 0, failures: 0, violations: 0, worst, offenders, order, sign };
         let mut last = None;
         let mut sound = true;
-        source.visit(query, &mut |case| {
+        values(gate, plan, source, query, &mut |case| {
             sound &= last < Some(case.case) && case.case < plan.population.planned;
             last = Some(case.case);
             let case = checked(case);
@@ -124,7 +161,7 @@ impl Cases {
             {
                 cases.worst = Some(case.clone());
             }
-            if offends(gate, &case) {
+            if offends(gate, plan, &case) {
                 cases.violations += 1;
                 // Equal values stay in the order of their cases.
                 let at = cases.offenders.partition_point(|other| badness(other) <= bad);
@@ -146,7 +183,7 @@ impl Cases {
         let asked = ranks(plan, cases.count);
         let ranks: Vec<u64> = asked.into_iter().filter(|rank| *rank < cases.count).collect();
         while !cases.order.end_pass(&ranks) {
-            source.visit(query, &mut |case| {
+            values(gate, plan, source, query, &mut |case| {
                 cases.order.push(badness(&checked(case)));
                 Ok(())
             })?;
@@ -169,8 +206,8 @@ impl Cases {
 /// Ranks that the value and the bound of a gate lie at in `n` cases, from the worst, 0.
 fn ranks(plan: &Plan<'_>, n: u64) -> Vec<u64> {
     match plan.claim {
-        Claim::Every => vec![0],
-        Claim::Share { allowed, confidence, .. } => {
+        Claim::Every | Claim::Searched | Claim::Share { outer: Some(_), .. } => vec![0],
+        Claim::Share { allowed, confidence, outer: None, .. } => {
             let most = most_violations(n, allowed, confidence);
             most.into_iter().chain([own_rank(n, allowed)]).collect()
         }
@@ -188,8 +225,18 @@ fn most_violations(n: u64, allowed: Probability, confidence: Confidence) -> Opti
     stats::most_exceedances(n, coverage, confidence, Tails::One)
 }
 
-fn offends(gate: &Gate, case: &CaseValue) -> bool {
-    match case.value {
+fn offends(gate: &Gate, plan: &Plan<'_>, case: &CaseValue) -> bool {
+    match (&case.value, &plan.claim) {
+        (Ok(Some(share)), Claim::Share { outer: Some(Outer { inner, most }), .. }) => {
+            // Shares of a whole number of cases, told apart in the middle between two.
+            !most.is_some_and(|most| *share < (most as f64 + 0.5) / *inner as f64)
+        }
+        (value, _) => breaks(gate, value),
+    }
+}
+
+fn breaks(gate: &Gate, value: &Result<Option<f64>, String>) -> bool {
+    match *value {
         Err(_) => true,
         Ok(Some(value)) => violates(gate, value),
         Ok(None) => false,
@@ -207,7 +254,10 @@ fn query<'a>(gate: &'a Gate, plan: &Plan<'a>) -> Query<'a> {
         baseline_run: selection.baseline_run,
         flight_times_s: selection.flight_times_s.as_deref(),
         mode: selection.mode.as_deref(),
-        worst: worst(gate),
+        worst: match gate.statistic {
+            Statistic::NestedStatement { .. } => Worst::Smallest,
+            _ => worst(gate),
+        },
     }
 }
 
@@ -223,13 +273,20 @@ pub fn visit(
 ) -> Result<(), Problems> {
     let run = Run::of(source);
     let plans = resolve(std::slice::from_ref(gate), &run, file)?;
-    plans.iter().try_for_each(|plan| source.visit(&query(gate, plan), visit))
+    plans.iter().try_for_each(|plan| values(gate, plan, source, &query(gate, plan), visit))
 }
 
 fn outcome(gate: &Gate, plan: &Plan<'_>, source: &impl Source) -> Result<Outcome, Problems> {
     let query = query(gate, plan);
+    if let Statistic::WorstOnWorst { region, sigma } = gate.statistic {
+        return Ok(searched(gate, plan, source.worst(&query, region, sigma)?));
+    }
     let cases = Cases::of(gate, plan, source, &query)?;
-    let missing = plan.population.planned - cases.len();
+    let planned = match plan.claim {
+        Claim::Share { outer: Some(Outer { inner, .. }), .. } => plan.population.planned / inner,
+        _ => plan.population.planned,
+    };
+    let missing = planned.saturating_sub(cases.len());
     let verdict = verdict(gate, plan, &cases, missing);
     Ok(describe(gate, plan, &cases, missing, verdict))
 }
@@ -240,8 +297,8 @@ fn verdict(gate: &Gate, plan: &Plan<'_>, cases: &Cases, missing: u64) -> Verdict
         return Verdict::Incomplete;
     }
     let (passes, fails) = match plan.claim {
-        Claim::Every => (cases.violations == 0, cases.violations > 0),
-        Claim::Share { allowed, confidence, independent } => {
+        Claim::Every | Claim::Searched => (cases.violations == 0, cases.violations > 0),
+        Claim::Share { allowed, confidence, independent, .. } => {
             let (k, n) = (cases.violations, cases.len());
             let shown = |test: Result<bool, stats::Error>| test.unwrap_or(false);
             (
@@ -269,12 +326,14 @@ fn value_and_bound(
 ) -> (Option<f64>, Option<f64>, Option<u64>) {
     let scale = gate.limit.quantity.scale();
     let n = cases.len();
-    let Claim::Share { allowed, confidence, independent } = plan.claim else {
+    let Claim::Share { allowed, confidence, independent, outer } = plan.claim else {
         let worst = cases.value_after(0).map(|value| value / scale);
         return (worst, worst, Some(0));
     };
     let most = most_violations(n, allowed, confidence);
-    if matches!(gate.statistic, Statistic::ShareBelow { .. } | Statistic::ShareAbove { .. }) {
+    let share =
+        matches!(gate.statistic, Statistic::ShareBelow { .. } | Statistic::ShareAbove { .. });
+    if share || outer.is_some() {
         let share =
             stats::clopper_pearson(cases.violations, n, confidence, Sides::Upper, independent).ok();
         let shown = |share: f64| match gate.limit.sense {
@@ -311,8 +370,12 @@ fn describe(
         .collect();
     let inconclusive = verdict == Verdict::Inconclusive;
     let confidence = match plan.claim {
-        Claim::Every => None,
+        Claim::Every | Claim::Searched => None,
         Claim::Share { confidence, .. } => Some(confidence.get()),
+    };
+    let metric_unit = match gate.statistic {
+        Statistic::NestedStatement { .. } => "1".to_owned(),
+        _ => column_unit(&plan.metric.unit),
     };
     Outcome {
         id: gate.id.clone(),
@@ -336,11 +399,68 @@ fn describe(
         most_violations,
         worst_case: worst.map(|case| case.case),
         worst_value: worst.and_then(|case| case.value.as_ref().ok().copied().flatten()),
-        metric_unit: column_unit(&plan.metric.unit),
+        metric_unit,
         cases_needed: needed.if_good.filter(|_| inconclusive),
         cases_needed_at_observed_rate: needed.at_rate.filter(|_| inconclusive),
         offenders,
         message: message(gate, cases, missing, verdict, &needed),
+        rationale: gate.rationale.clone(),
+    }
+}
+
+/// What a search shows: it fails by the worst case found, and passes where neither that nor what the search
+/// may have left undone breaks the limit.
+fn searched(gate: &Gate, plan: &Plan<'_>, found: Option<Searched>) -> Outcome {
+    let against = |value: Option<f64>| breaks(gate, &Ok(value));
+    let verdict = match &found {
+        None => Verdict::Incomplete,
+        Some(found) if against(found.value) => Verdict::Fail,
+        Some(found) if against(found.at_worst) => Verdict::Inconclusive,
+        Some(_) => Verdict::Pass,
+    };
+    let scale = gate.limit.quantity.scale();
+    let scaled = |value: Option<f64>| value.map(|value| value / scale);
+    let message = match &found {
+        None => {
+            "no such search: tvse worst, with this variant, mode, baseline, size and these flight \
+                 times, makes one"
+                .to_owned()
+        }
+        Some(found) => {
+            let left = match verdict {
+                Verdict::Inconclusive => {
+                    "; the search ended before a stationary point, and what it may \
+                                          have left breaks the limit"
+                }
+                _ => "",
+            };
+            format!("worst case found: {} (tvse replay RUN --worst {0}){left}", found.name)
+        }
+    };
+    Outcome {
+        id: gate.id.clone(),
+        population: gate.selection.population.clone(),
+        verdict,
+        severity: gate.severity,
+        statistic: statistic_in_words(gate),
+        value: scaled(found.as_ref().and_then(|found| found.value)),
+        bound: scaled(found.as_ref().and_then(|found| found.at_worst)),
+        sense: "at_least",
+        limit: gate.limit.quantity.value,
+        unit: gate.limit.quantity.unit.clone(),
+        confidence: None,
+        cases: found.as_ref().map_or(0, |found| found.cases),
+        failures: 0,
+        missing: 0,
+        violations: u64::from(verdict == Verdict::Fail),
+        most_violations: Some(0),
+        worst_case: None,
+        worst_value: found.as_ref().and_then(|found| found.value),
+        metric_unit: column_unit(&plan.metric.unit),
+        cases_needed: None,
+        cases_needed_at_observed_rate: None,
+        offenders: Vec::new(),
+        message,
         rationale: gate.rationale.clone(),
     }
 }
@@ -417,6 +537,12 @@ fn statistic_in_words(gate: &Gate) -> String {
         Statistic::ToleranceBound { coverage, .. } => {
             format!("bound of {of} kept by {} of the population", coverage.get())
         }
+        Statistic::NestedStatement { threshold, .. } => {
+            format!("share of outer draws with few enough {of} below {threshold}")
+        }
+        Statistic::WorstOnWorst { region, sigma } => {
+            format!("worst on worst of {of} in the {} of {sigma} σ", region.name())
+        }
     };
     let words = if selection.baseline_run { words + ", less the baseline run" } else { words };
     match &selection.flight_times_s {
@@ -429,7 +555,11 @@ fn statistic_in_words(gate: &Gate) -> String {
 }
 
 fn message(gate: &Gate, cases: &Cases, missing: u64, verdict: Verdict, needed: &Needed) -> String {
-    let mut text = format!("{} of {} cases count against the gate", cases.violations, cases.len());
+    let what = match gate.statistic {
+        Statistic::NestedStatement { .. } => "outer draws",
+        _ => "cases",
+    };
+    let mut text = format!("{} of {} {what} count against the gate", cases.violations, cases.len());
     if cases.failures > 0 {
         text += &format!(", {} of them because they failed", cases.failures);
     }
@@ -444,7 +574,7 @@ fn message(gate: &Gate, cases: &Cases, missing: u64, verdict: Verdict, needed: &
             let count = |number: Option<u64>| {
                 number.map_or("no number of".to_string(), |number| number.to_string())
             };
-            text += &format!("; a pass needs {} more cases", count(needed.if_good));
+            text += &format!("; a pass needs {} more {what}", count(needed.if_good));
             if cases.violations > 0 {
                 text += &format!(
                     " if all of them are good, {} at the observed rate",
@@ -457,7 +587,7 @@ fn message(gate: &Gate, cases: &Cases, missing: u64, verdict: Verdict, needed: &
         }
     }
     if missing > 0 {
-        text += &format!("; {missing} planned cases are missing");
+        text += &format!("; {missing} planned {what} are missing");
     }
     text
 }

@@ -13,9 +13,10 @@ mod verdict;
 
 pub use evaluate::{check, evaluate, visit};
 pub use outcome::{Offender, Outcome, Report, report_schema};
-pub use raw::{RawGate, RawGates, RawSeverity, RawStatistic, schema};
+pub use raw::{RawGate, RawGates, RawSeverity, RawStatistic, Region, schema};
 pub use rule::{Gate, Limit, Quantity, Selection, Sense, Statistic, parse};
 pub use source::{
-    CaseValue, Metric, MissingMeans, Names, Population, Query, Source, Table, Worst, reduce,
+    CaseValue, Metric, MissingMeans, Names, NestedPlan, Population, Query, Searched, Source, Table,
+    Worst, reduce,
 };
 pub use verdict::{Severity, Verdict, combine};

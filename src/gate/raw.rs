@@ -18,7 +18,7 @@ pub struct RawGates {
 /// One gate.
 ///
 /// Beside the keys below a gate has a limit, `at_least_<unit>` or `at_most_<unit>`, and, for the
-/// statistics `share_below` and `share_above`, a `threshold_<unit>`. The unit is that of the metric
+/// statistics `share_below`, `share_above` and `nested_statement`, a `threshold_<unit>`. The unit is that of the metric
 /// as column names write it (`s`, `hz`, `rad_s`; `1` or `percent` for a metric without unit); the
 /// limit of a share is in `percent` or `1`.
 #[derive(Debug, Clone, Default, serde::Deserialize, schemars::JsonSchema)]
@@ -54,6 +54,10 @@ pub struct RawGate {
     pub quantile: Option<f64>,
     /// Share of the population that a tolerance bound covers, between 0 and 1.
     pub coverage: Option<f64>,
+    /// Region that `tvse worst` searched.
+    pub region: Option<Region>,
+    /// Half width of the box or radius of the ellipsoid, σ, as `tvse worst` was told.
+    pub sigma: Option<f64>,
     /// Confidence of the verdict, above 0.5 and below 1 (or give `risk`).
     pub confidence: Option<f64>,
     /// Consumer's risk, 1 − confidence.
@@ -84,6 +88,32 @@ pub enum RawStatistic {
     Quantile,
     /// Bound that `coverage` of the population keeps, an order statistic (Wilks; consumer's risk).
     ToleranceBound,
+    /// Of a nested plan, the share of outer draws whose inner cases show, at the plan's risk, that at most
+    /// the plan's allowed share lies below the threshold; `at_least` the limit, by its exact bound.
+    NestedStatement,
+    /// The worst of what `tvse worst` found in the `region` of `sigma`, `at_least` the limit. A search, no
+    /// sample: nothing is said of a share.
+    WorstOnWorst,
+}
+
+/// Region of a search for worst cases.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Region {
+    /// Every draw key within ±sigma: vertices, corners and descents.
+    Box,
+    /// All keys together within sigma, √Σz²: equal joint likelihood.
+    Ellipsoid,
+}
+
+impl Region {
+    /// The word in gate files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Box => "box",
+            Self::Ellipsoid => "ellipsoid",
+        }
+    }
 }
 
 /// Whether a gate decides the exit code.

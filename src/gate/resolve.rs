@@ -6,7 +6,7 @@ use super::rule::{Gate, Quantity, Sense, Statistic};
 use super::source::{Metric, MissingMeans, Names, Population, Table};
 use crate::problem::Problems;
 use crate::spelling::allowed_instead;
-use crate::stats::{Confidence, Independent, Probability};
+use crate::stats::{self, Confidence, Independent, Probability, Tails};
 
 /// What a run has.
 pub(super) struct Run {
@@ -42,8 +42,24 @@ pub(super) struct Plan<'a> {
 pub(super) enum Claim {
     /// No case breaks the limit.
     Every,
-    /// At most `allowed` of the population breaks it.
-    Share { allowed: Probability, confidence: Confidence, independent: Independent },
+    /// No case that a search found breaks it.
+    Searched,
+    /// At most `allowed` of the population breaks it; `outer`: of the outer draws.
+    Share {
+        allowed: Probability,
+        confidence: Confidence,
+        independent: Independent,
+        outer: Option<Outer>,
+    },
+}
+
+/// What is asked of each outer draw of a nested plan.
+#[derive(Clone, Copy)]
+pub(super) struct Outer {
+    /// Its cases.
+    pub inner: u64,
+    /// The most of them that may be bad; none where even none would show nothing.
+    pub most: Option<u64>,
 }
 
 /// A plan for each gate, or everything that the run does not have.
@@ -146,7 +162,8 @@ impl Check<'_> {
             self.rows(gate, metric);
             match &gate.statistic {
                 Statistic::ShareBelow { threshold, .. }
-                | Statistic::ShareAbove { threshold, .. } => {
+                | Statistic::ShareAbove { threshold, .. }
+                | Statistic::NestedStatement { threshold, .. } => {
                     self.unit("threshold", threshold, metric);
                 }
                 _ => self.unit("limit", &gate.limit.quantity, metric),
@@ -188,6 +205,13 @@ impl Check<'_> {
                 }
             }
         }
+        if matches!(gate.statistic, Statistic::WorstOnWorst { .. }) {
+            let searched = ["damping_ratio", "time_to_double_s"];
+            if metric.table != Table::Modes || !searched.contains(&metric.name.as_str()) {
+                let allowed = format!("{}: what tvse worst searches", searched.join(" or "));
+                self.problem("metric", &metric.name, allowed);
+            }
+        }
         let paired = selection.baseline.is_some() || selection.baseline_run;
         if paired && metric.missing == MissingMeans::NotApplicableGood {
             let found = format!("a difference of {}", metric.name);
@@ -198,7 +222,10 @@ impl Check<'_> {
     fn claim(&mut self, gate: &Gate, population: &Population) -> Option<Claim> {
         let (allowed, confidence) = match gate.statistic {
             Statistic::Extreme => return Some(Claim::Every),
-            Statistic::ShareBelow { confidence, .. } | Statistic::ShareAbove { confidence, .. } => {
+            Statistic::WorstOnWorst { .. } => return Some(Claim::Searched),
+            Statistic::ShareBelow { confidence, .. }
+            | Statistic::ShareAbove { confidence, .. }
+            | Statistic::NestedStatement { confidence, .. } => {
                 let limit = gate.limit.quantity.base();
                 let allowed = match gate.limit.sense {
                     Sense::AtMost => limit,
@@ -222,14 +249,44 @@ impl Check<'_> {
             );
             return None;
         };
+        if let Statistic::NestedStatement { .. } = gate.statistic {
+            return self.outer(population, allowed, confidence);
+        }
         match population.drawing.independent() {
-            Ok(independent) => Some(Claim::Share { allowed, confidence, independent }),
+            Ok(independent) => Some(Claim::Share { allowed, confidence, independent, outer: None }),
             Err(error) => {
                 self.problem(
                     "statistic",
                     error.to_string(),
                     "minimum or maximum, or a population of independent draws",
                 );
+                None
+            }
+        }
+    }
+}
+
+impl Check<'_> {
+    /// The claim on the outer draws of a nested plan, which are independent.
+    fn outer(
+        &mut self,
+        population: &Population,
+        allowed: Probability,
+        confidence: Confidence,
+    ) -> Option<Claim> {
+        let Some(plan) = population.nested else {
+            let found = format!("a population of {}", population.drawing.describe());
+            self.problem("statistic", found, "a population with a nested plan");
+            return None;
+        };
+        let coverage = Probability::new(1.0 - plan.allowed_share).ok()?;
+        let risk = Confidence::from_risk(plan.risk).ok()?;
+        let most = stats::most_exceedances(plan.inner, coverage, risk, Tails::One);
+        let outer = Some(Outer { inner: plan.inner, most });
+        match population.drawing.independent_replicates(population.planned / plan.inner.max(1)) {
+            Ok(independent) => Some(Claim::Share { allowed, confidence, independent, outer }),
+            Err(error) => {
+                self.problem("statistic", error.to_string(), "two outer draws or more");
                 None
             }
         }

@@ -2,7 +2,7 @@
 //!
 //! Whether a run has what the gate asks for is checked in `evaluate`.
 
-use super::raw::{Entry, PREFIXES, RawSeverity, RawStatistic, read};
+use super::raw::{Entry, PREFIXES, RawSeverity, RawStatistic, Region, read};
 use super::verdict::Severity;
 use crate::problem::Problems;
 use crate::stats::{Confidence, Probability};
@@ -90,6 +90,20 @@ pub enum Statistic {
         coverage: Probability,
         /// Confidence of the verdict.
         confidence: Confidence,
+    },
+    /// Share of outer draws of a nested plan of which its statement on values below the threshold is shown.
+    NestedStatement {
+        /// Threshold of the metric.
+        threshold: Quantity,
+        /// Confidence of the verdict.
+        confidence: Confidence,
+    },
+    /// The worst case of a search.
+    WorstOnWorst {
+        /// Where it was searched.
+        region: Region,
+        /// Its size, σ.
+        sigma: f64,
     },
 }
 
@@ -252,15 +266,23 @@ impl Check<'_> {
 
     /// Keys that a statistic does not use.
     fn unused(&mut self, entry: &Entry, statistic: RawStatistic) {
-        use RawStatistic::{Maximum, Minimum, Quantile, ShareAbove, ShareBelow, ToleranceBound};
-        let share = matches!(statistic, ShareBelow | ShareAbove);
-        let extreme = matches!(statistic, Minimum | Maximum);
+        use RawStatistic::{
+            Maximum, Minimum, NestedStatement, Quantile, ShareAbove, ShareBelow, ToleranceBound,
+            WorstOnWorst,
+        };
+        let share = matches!(statistic, ShareBelow | ShareAbove | NestedStatement);
+        let searched = statistic == WorstOnWorst;
+        let extreme = matches!(statistic, Minimum | Maximum | WorstOnWorst);
         let raw = &entry.gate;
         for (key, unused) in [
             ("quantile", raw.quantile.is_some() && statistic != Quantile),
             ("coverage", raw.coverage.is_some() && statistic != ToleranceBound),
             ("confidence", raw.confidence.is_some() && extreme),
             ("risk", raw.risk.is_some() && extreme),
+            ("region", raw.region.is_some() && !searched),
+            ("sigma", raw.sigma.is_some() && !searched),
+            ("min_cases", raw.min_cases.is_some() && searched),
+            ("baseline_run", raw.baseline_run == Some(true) && searched),
         ] {
             if unused {
                 self.problem(key, "a value", "nothing: the statistic does not use it");
@@ -278,7 +300,8 @@ impl Check<'_> {
             self.problem(
                 "statistic",
                 "nothing",
-                "one of minimum, maximum, share_below, share_above, quantile, tolerance_bound",
+                "one of minimum, maximum, share_below, share_above, quantile, tolerance_bound, \
+                 nested_statement, worst_on_worst",
             );
         }
         let limit = self.quantity(&entry, &PREFIXES[..2], "limit").map(|(index, quantity)| Limit {
@@ -349,6 +372,12 @@ impl Check<'_> {
         limit: &Option<Limit>,
     ) -> Option<Statistic> {
         let sense = limit.as_ref().map(|limit| limit.sense);
+        if matches!(raw, RawStatistic::NestedStatement | RawStatistic::WorstOnWorst)
+            && sense == Some(Sense::AtMost)
+        {
+            self.problem("limit", "at_most", "at_least for this statistic");
+            return None;
+        }
         match raw {
             RawStatistic::Minimum | RawStatistic::Maximum => {
                 let wanted =
@@ -363,7 +392,7 @@ impl Check<'_> {
                 }
                 Some(Statistic::Extreme)
             }
-            RawStatistic::ShareBelow | RawStatistic::ShareAbove => {
+            RawStatistic::ShareBelow | RawStatistic::ShareAbove | RawStatistic::NestedStatement => {
                 let confidence = self.confidence(entry.gate.confidence, entry.gate.risk);
                 let threshold = self.quantity(entry, &PREFIXES[2..], "threshold");
                 if let Some(Limit { quantity, .. }) = limit {
@@ -379,10 +408,10 @@ impl Check<'_> {
                     }
                 }
                 let (threshold, confidence) = (threshold?.1, confidence?);
-                Some(if raw == RawStatistic::ShareBelow {
-                    Statistic::ShareBelow { threshold, confidence }
-                } else {
-                    Statistic::ShareAbove { threshold, confidence }
+                Some(match raw {
+                    RawStatistic::ShareBelow => Statistic::ShareBelow { threshold, confidence },
+                    RawStatistic::ShareAbove => Statistic::ShareAbove { threshold, confidence },
+                    _ => Statistic::NestedStatement { threshold, confidence },
                 })
             }
             RawStatistic::Quantile => {
@@ -394,6 +423,18 @@ impl Check<'_> {
                 let coverage = self.probability("coverage", entry.gate.coverage);
                 let confidence = self.confidence(entry.gate.confidence, entry.gate.risk);
                 Some(Statistic::ToleranceBound { coverage: coverage?, confidence: confidence? })
+            }
+            RawStatistic::WorstOnWorst => {
+                let region = entry.gate.region;
+                if region.is_none() {
+                    self.problem("region", "nothing", "box or ellipsoid");
+                }
+                let sigma = entry.gate.sigma.filter(|sigma| *sigma > 0.0 && sigma.is_finite());
+                if sigma.is_none() {
+                    let found = entry.gate.sigma.map_or("nothing".into(), |s| s.to_string());
+                    self.problem("sigma", found, "a number above 0, that of the search");
+                }
+                Some(Statistic::WorstOnWorst { region: region?, sigma: sigma? })
             }
         }
     }

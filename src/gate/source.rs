@@ -2,6 +2,7 @@
 //!
 //! Implemented by the reader of the tables; here is no file and no table.
 
+use super::raw::Region;
 use crate::problem::Problems;
 use crate::stats::Drawing;
 
@@ -37,7 +38,7 @@ pub struct Metric {
 }
 
 /// A population of a run.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Population {
     /// Name.
     pub name: String,
@@ -45,6 +46,32 @@ pub struct Population {
     pub planned: u64,
     /// How they came about.
     pub drawing: Drawing,
+    /// The statements of a nested plan.
+    pub nested: Option<NestedPlan>,
+}
+
+/// What a nested plan states of each outer draw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NestedPlan {
+    /// Cases of an outer draw, in a row.
+    pub inner: u64,
+    /// Share of them that may be bad.
+    pub allowed_share: f64,
+    /// Risk of the statement that no more are.
+    pub risk: f64,
+}
+
+/// What a search for worst cases found in a region.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Searched {
+    /// Name of the worst case.
+    pub name: String,
+    /// The metric there; `None` where it does not arise, which is good.
+    pub value: Option<f64>,
+    /// The metric at the linear prediction of what the search left.
+    pub at_worst: Option<f64>,
+    /// Cases found in the region.
+    pub cases: u64,
 }
 
 /// Which end of a case's values is its worst.
@@ -113,6 +140,15 @@ pub trait Source: Names {
         query: &Query<'_>,
         visit: &mut dyn FnMut(CaseValue) -> Result<(), Problems>,
     ) -> Result<(), Problems>;
+
+    /// The worst case that a search found in a region of so many σ, at just the flight times of the query;
+    /// `None` where there was no such search.
+    fn worst(
+        &self,
+        query: &Query<'_>,
+        region: Region,
+        sigma: f64,
+    ) -> Result<Option<Searched>, Problems>;
 }
 
 /// Reduces the selected rows of a case to its worst.

@@ -5,7 +5,7 @@
 
 use super::run::Run;
 use super::source::{Value, less_stable_values};
-use crate::gate::{CaseValue, Names, Query, Source, Table, reduce};
+use crate::gate::{CaseValue, Names, Query, Region, Searched, Source, Table, reduce};
 use crate::problem::Problems;
 use std::ops::Range;
 
@@ -195,6 +195,15 @@ impl Names for Pair<'_> {
 }
 
 impl Source for Pair<'_> {
+    fn worst(
+        &self,
+        query: &Query<'_>,
+        region: Region,
+        sigma: f64,
+    ) -> Result<Option<Searched>, Problems> {
+        self.run.worst(query, region, sigma)
+    }
+
     fn visit(
         &self,
         query: &Query<'_>,

@@ -112,6 +112,11 @@ impl Run {
         Self { folder: folder.to_owned(), ..self }
     }
 
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// The outline of the run.
     pub fn outline(&self) -> &Outline {
         &self.outline

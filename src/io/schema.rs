@@ -25,7 +25,7 @@ use std::sync::Arc;
 pub const VERSION: u32 = 2;
 
 /// Most cases in a row group.
-const MOST_GROUP_CASES: u64 = 8192;
+const MOST_GROUP_CASES: u64 = 32768;
 /// Cells of a row group of the `cases` table are kept near this number: few row groups, since the
 /// footer that tells of them is held in memory, and small ones, since each is too.
 const GROUP_CELLS: u64 = 1 << 20;

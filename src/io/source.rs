@@ -5,10 +5,11 @@
 use super::column::{Column, Get};
 use super::run::Run;
 use super::schema;
-use crate::campaign::Outline;
 use crate::campaign::row::ModeRow;
+use crate::campaign::{Outline, Sample};
 use crate::gate::{
-    CaseValue, Metric, MissingMeans, Names, Population, Query, Source, Table, reduce,
+    CaseValue, Metric, MissingMeans, Names, NestedPlan, Population, Query, Region, Searched,
+    Source, Table, reduce,
 };
 use crate::problem::Problems;
 
@@ -30,6 +31,11 @@ impl Names for Outline {
             name: p.name.clone(),
             planned: p.cases,
             drawing: p.drawing(),
+            nested: Sample::of(p).nested().map(|(inner, allowed_share, risk)| NestedPlan {
+                inner,
+                allowed_share,
+                risk,
+            }),
         };
         self.definition.populations.iter().map(population).collect()
     }
@@ -84,6 +90,15 @@ impl Source for Run {
             Table::Cases => of_cases(self, population, query, visit),
             Table::Modes => of_modes(self, population, query, visit),
         }
+    }
+
+    fn worst(
+        &self,
+        query: &Query<'_>,
+        region: Region,
+        sigma: f64,
+    ) -> Result<Option<Searched>, Problems> {
+        super::worst::searched(self, query, region, sigma)
     }
 }
 
@@ -225,8 +240,10 @@ fn of_modes(
     last.map_or(Ok(()), |last| finish(last, &mut places))
 }
 
+type Getter = Box<dyn Fn(&ModeRow) -> Option<f64>>;
+
 /// How a metric is taken from a row of the table `modes`.
-fn getter(run: &Run, metric: &Metric) -> Box<dyn Fn(&ModeRow) -> Option<f64>> {
+fn getter(run: &Run, metric: &Metric) -> Getter {
     let columns = schema::modes(run.outline());
     match columns.into_iter().find(|column| column.name == metric.name).map(|column| column.get) {
         Some(Get::Number(get)) => get,

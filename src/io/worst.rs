@@ -7,7 +7,8 @@ use super::run::Run;
 use super::schema::TableName;
 use super::stored::POLE_COLUMNS;
 use super::{files, folder};
-use crate::campaign::worst::{Aim, WorstCase};
+use crate::campaign::worst::{Aim, Method, Quantity, WorstCase};
+use crate::gate::{self, Query, Searched};
 use crate::problem::{Kind, Problems};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
@@ -25,6 +26,8 @@ pub struct Found {
     pub run: String,
     /// What was made least.
     pub aim: Aim,
+    /// Indices of the flight times that were searched, in ascending order.
+    pub flight_times: Vec<usize>,
     /// Half width of the box, σ.
     pub box_sigma: f64,
     /// Radius of the ellipsoid, σ.
@@ -77,6 +80,76 @@ pub fn read(run: &Path, identity: &str) -> Result<Vec<Found>, Problems> {
         problems.into_result(())?;
     }
     Ok(all)
+}
+
+/// The worst case that the searches of a run found for a gate: in a region of `sigma`, in the variant, over the
+/// baseline and for the modes of the query, at just its flight times. `None` where one is not there.
+///
+/// # Errors
+/// Damage: a file that cannot be understood or belongs to another run.
+pub fn searched(
+    run: &Run,
+    query: &Query<'_>,
+    region: gate::Region,
+    sigma: f64,
+) -> Result<Option<Searched>, Problems> {
+    let outline = run.outline();
+    let definition = &outline.definition;
+    let variant =
+        |name: Option<&str>| definition.variants.iter().position(|v| Some(v.name.as_str()) == name);
+    let times = definition.flight_times_s.iter().enumerate();
+    let chosen =
+        times.filter(|(_, time)| query.flight_times_s.is_none_or(|all| all.contains(time)));
+    let flight_times: Vec<usize> = chosen.map(|(index, _)| index).collect();
+    let quantity = match query.metric.name.as_str() {
+        "damping_ratio" => Quantity::DampingRatio,
+        _ => Quantity::Decay,
+    };
+    let in_region = |method: Method| match region {
+        gate::Region::Box => matches!(method, Method::Vertex | Method::Corners | Method::Box),
+        gate::Region::Ellipsoid => method == Method::Ellipsoid,
+    };
+    // Of a decay −Re s the metric is the time to double, which grows with it below zero.
+    let metric = |objective: f64| match quantity {
+        Quantity::DampingRatio => Some(objective),
+        Quantity::Decay => (objective < 0.0).then(|| std::f64::consts::LN_2 / -objective),
+    };
+    let all = read(run.folder(), &outline.identity())?;
+    let mut cases: Vec<&WorstCase> = Vec::new();
+    for (mode, name) in definition.modes.iter().enumerate() {
+        if query.mode.is_some_and(|wanted| wanted != name) {
+            continue;
+        }
+        let (here, baseline) = (variant(query.variant), variant(query.baseline));
+        let aim = here.map(|variant| Aim { variant, baseline, mode, quantity });
+        let size = |found: &Found| match region {
+            gate::Region::Box => found.box_sigma,
+            gate::Region::Ellipsoid => found.radius_sigma,
+        };
+        let search = all.iter().find(|found| {
+            Some(found.aim) == aim && found.flight_times == flight_times && size(found) == sigma
+        });
+        let Some(search) = search else { return Ok(None) };
+        let before = cases.len();
+        cases.extend(search.cases.iter().filter(|case| in_region(case.method)));
+        if cases.len() == before {
+            return Ok(None);
+        }
+    }
+    let least = |of: &dyn Fn(&WorstCase) -> f64| {
+        cases
+            .iter()
+            .min_by(|a, b| of(a).total_cmp(&of(b)))
+            .map(|case| (case.name.clone(), of(case)))
+    };
+    let Some((name, worst)) = least(&|case| case.objective) else { return Ok(None) };
+    let left = least(&|case| case.objective - case.gap.unwrap_or(0.0));
+    Ok(Some(Searched {
+        name,
+        value: metric(worst),
+        at_worst: metric(left.map_or(worst, |(_, left)| left)),
+        cases: cases.len() as u64,
+    }))
 }
 
 /// A case of the sample, reduced to its worst flight time.

@@ -9,9 +9,29 @@ use crate::campaign::influence::Influence;
 /// Values of the damping ratio with one key at a low and at a high place, all else nominal.
 pub type Tornado = Option<[f64; 2]>;
 
-/// One row per draw, all numbers.
-pub fn rows(draws: &[DrawColumn], all: &[(Influence, Tornado)]) -> Rows {
+/// The ranking of the draws by what they do to a mode in a variant at a flight time.
+pub struct Ranking<'a> {
+    /// Variant.
+    pub variant: &'a str,
+    /// Flight time, s.
+    pub flight_time_s: f64,
+    /// Mode.
+    pub mode: &'a str,
+    /// Damping ratio of the nominal vehicle.
+    pub nominal: Option<f64>,
+    /// Low and high place of the tornado, σ.
+    pub sigma: f64,
+    /// Influences with their bars, the greatest first.
+    pub all: Vec<(Influence, Tornado)>,
+}
+
+/// One row per ranking and draw, all numbers.
+pub fn rows(draws: &[DrawColumn], rankings: &[Ranking<'_>]) -> Rows {
     let mut rows = Rows::new(&[
+        "variant",
+        "flight_time_s",
+        "mode",
+        "rank",
         "key",
         "mean_modulus",
         "mean_modulus_low",
@@ -21,30 +41,36 @@ pub fn rows(draws: &[DrawColumn], all: &[(Influence, Tornado)]) -> Rows {
         "mean_high",
         "standard_deviation",
         "share_linear",
-        "share_linear_low",
-        "share_linear_high",
         "total_index_bound",
+        "tornado_sigma",
+        "damping_ratio_nominal",
         "damping_ratio_at_low",
         "damping_ratio_at_high",
     ]);
-    for (of, tornado) in all {
-        let end = |interval: Option<[f64; 2]>, side: usize| number(interval.map(|i| i[side]));
-        rows.push(vec![
-            draws[of.draw].key.clone(),
-            number(Some(of.mean_modulus)),
-            end(of.mean_modulus_interval, 0),
-            end(of.mean_modulus_interval, 1),
-            number(Some(of.mean)),
-            end(of.mean_interval, 0),
-            end(of.mean_interval, 1),
-            number(of.standard_deviation),
-            number(of.share),
-            end(of.share_interval, 0),
-            end(of.share_interval, 1),
-            number(of.total_bound),
-            end(*tornado, 0),
-            end(*tornado, 1),
-        ]);
+    for ranking in rankings {
+        for (rank, (of, tornado)) in ranking.all.iter().enumerate() {
+            let end = |interval: Option<[f64; 2]>, side: usize| number(interval.map(|i| i[side]));
+            rows.push(vec![
+                ranking.variant.to_owned(),
+                ranking.flight_time_s.to_string(),
+                ranking.mode.to_owned(),
+                (rank + 1).to_string(),
+                draws[of.draw].key.clone(),
+                number(Some(of.mean_modulus)),
+                end(of.mean_modulus_interval, 0),
+                end(of.mean_modulus_interval, 1),
+                number(Some(of.mean)),
+                end(of.mean_interval, 0),
+                end(of.mean_interval, 1),
+                number(of.standard_deviation),
+                number(of.share),
+                number(of.total_bound),
+                number(Some(ranking.sigma)),
+                number(ranking.nominal),
+                end(*tornado, 0),
+                end(*tornado, 1),
+            ]);
+        }
     }
     rows
 }

@@ -3,9 +3,9 @@
 //! The numbers are those of `campaign::statistics` and `campaign::sensitivity`.
 
 use super::significant;
-use crate::campaign::sensitivity::Ranking;
+use crate::campaign::sample::Intervals;
+use crate::campaign::sensitivity::{Index, Ranking};
 use crate::campaign::statistics::Line;
-use crate::stats::Estimate;
 use comfy_table::{CellAlignment, Table, presets};
 
 /// A table of texts with a heading, to be shown or written.
@@ -88,11 +88,12 @@ pub fn lines<'a>(all: impl IntoIterator<Item = (&'a str, &'a [Line])>) -> Rows {
     rows
 }
 
-/// A ranking of draws with the data of a tornado chart.
-pub fn ranking(ranking: &Ranking) -> Rows {
-    const HEAD: [&str; 16] = [
-        "draw key",
+/// Rankings of draws, each of a metric, with the data of a tornado chart.
+pub fn rankings<'a>(all: impl IntoIterator<Item = (&'a str, &'a Ranking)>) -> Rows {
+    let mut rows = Rows::new(&[
+        "metric",
         "rank",
+        "key",
         "src",
         "src_low",
         "src_high",
@@ -105,20 +106,27 @@ pub fn ranking(ranking: &Ranking) -> Rows {
         "total",
         "total_low",
         "total_high",
+        "change_per_sigma",
         "at_low",
         "at_high",
-    ];
-    let mut rows = Rows::new(&HEAD);
-    for (rank, effect) in ranking.effects.iter().enumerate() {
-        let mut row = vec![effect.key.clone(), (rank + 1).to_string()];
-        for estimate in [effect.regression, effect.partial_rank, effect.first_order, effect.total] {
-            row.push(number(estimate.map(|e| e.point())));
-            row.push(number(estimate.as_ref().map(Estimate::lower)));
-            row.push(number(estimate.as_ref().map(Estimate::upper)));
+        "intervals",
+    ]);
+    for (metric, ranking) in all {
+        for (rank, effect) in ranking.effects.iter().enumerate() {
+            let mut row = vec![metric.to_owned(), (rank + 1).to_string(), effect.key.clone()];
+            for of in [effect.regression, effect.partial_rank, effect.first_order, effect.total] {
+                let interval = of.and_then(|of| of.interval);
+                row.push(number(of.map(|of| of.value)));
+                row.push(number(interval.map(|[low, _]| low)));
+                row.push(number(interval.map(|[_, high]| high)));
+            }
+            let deviation = ranking.standard_deviation;
+            row.push(number(effect.regression.and_then(|src| Some(src.value * deviation?))));
+            row.push(number(effect.tornado.map(|[low, _]| low)));
+            row.push(number(effect.tornado.map(|[_, high]| high)));
+            row.push(ranking.intervals.map_or("", Intervals::name).to_owned());
+            rows.rows.push(row);
         }
-        row.push(number(effect.tornado.map(|[low, _]| low)));
-        row.push(number(effect.tornado.map(|[_, high]| high)));
-        rows.rows.push(row);
     }
     rows
 }
@@ -135,12 +143,15 @@ pub fn ranking_text(all: &Ranking, most: usize) -> String {
         "at low",
         "at high",
     ]);
-    let cell = |estimate: Option<Estimate>| {
-        let text = |e: Estimate| {
-            let [point, low, high] = [e.point(), e.lower(), e.upper()].map(significant);
-            format!("{point} ({low} – {high})")
+    let cell = |of: Option<Index>| {
+        let text = |of: Index| match of.interval {
+            None => significant(of.value),
+            Some(interval) => {
+                let [low, high] = interval.map(significant);
+                format!("{} ({low} – {high})", significant(of.value))
+            }
         };
-        estimate.map_or_else(String::new, text)
+        of.map_or_else(String::new, text)
     };
     for (rank, effect) in all.effects.iter().take(most).enumerate() {
         rows.rows.push(vec![
@@ -155,6 +166,9 @@ pub fn ranking_text(all: &Ranking, most: usize) -> String {
         ]);
     }
     let mut text = rows.text();
+    if all.intervals == Some(Intervals::Replicates) {
+        text += "95 % intervals: Student's t over the indices of the plan's replicates\n";
+    }
     if let Some(explained) = all.explained {
         text += &format!("the linear model explains {} of the variance\n", significant(explained));
     }

@@ -5,7 +5,7 @@
 
 use super::significant;
 use crate::campaign::summary::{Group, LEVELS, SummaryRow, WorstRow};
-use crate::campaign::{Outline, Population};
+use crate::campaign::{Definition, Outline, Population};
 use crate::dispersion::Scheme;
 use crate::stats::Drawing;
 use comfy_table::{CellAlignment, Table, presets};
@@ -36,7 +36,11 @@ pub fn story(outline: &Outline, summary: &[SummaryRow], worst: &[WorstRow]) -> S
             };
             let failures = rows().filter(|row| row.group.flight_time.is_none());
             let failures = failures.map(|row| row.failures).max().unwrap_or(0);
-            let failed = if failures > 0 { format!(", {failures} failed") } else { String::new() };
+            let failed = if failures > 0 {
+                format!(", {failures} failed, counted as unstable")
+            } else {
+                String::new()
+            };
             let scheme = if p.scheme.is_monte_carlo() {
                 String::new()
             } else {
@@ -57,7 +61,7 @@ pub fn story(outline: &Outline, summary: &[SummaryRow], worst: &[WorstRow]) -> S
                 );
             }
             line(&mut text, format_args!("{}", table(outline, summary, rows())));
-            line(&mut text, format_args!("{}\n", claims(p, rows())));
+            line(&mut text, format_args!("{}\n", claims(definition, p, rows())));
             for (variant, v) in definition.variants.iter().enumerate() {
                 let of_variant = |row: &&WorstRow| {
                     (row.population, row.mode, row.variant, row.rank)
@@ -76,6 +80,7 @@ pub fn story(outline: &Outline, summary: &[SummaryRow], worst: &[WorstRow]) -> S
 
 /// How many claims the table makes at once, or why none; and what outer draws show.
 fn claims<'a>(
+    definition: &Definition,
     population: &Population,
     rows: impl Iterator<Item = &'a SummaryRow> + Clone,
 ) -> String {
@@ -96,7 +101,7 @@ fn claims<'a>(
             (drawing, _) => format!("no intervals: these cases are {}", drawing.describe()),
         }
     };
-    for row in rows {
+    for row in rows.filter(|row| row.group.flight_time.is_none()) {
         let (Some(outer), Scheme::Nested { inner, allowed_share, risk, .. }) =
             (row.outer, &population.scheme)
         else {
@@ -107,7 +112,7 @@ fn claims<'a>(
             text,
             "\nvariant {}: {} of {} outer draws are shown to have at most {} % of unstable or failed cases \
              (risk {} %), {} not to; {} % meet it, 95 % interval {low} – {high}",
-            row.group.variant,
+            definition.variants[row.group.variant].name,
             outer.met,
             population.cases / inner,
             significant(100.0 * allowed_share),
@@ -236,7 +241,10 @@ mod tests {
     fn the_story_has_a_line_for_every_variant_and_time_and_names_failures() {
         let outline = synthetic::outline(&[1, 6], StoredPoles::Named);
         let text = story(&outline, &summary(&outline), &[]);
-        assert!(text.starts_with("tvse, dispersed: 6 cases, 1 failed\n"), "{text}");
+        assert!(
+            text.starts_with("tvse, dispersed: 6 cases, 1 failed, counted as unstable\n"),
+            "{text}"
+        );
         let values: Vec<Vec<&str>> = text
             .lines()
             .filter(|line| line.starts_with('|') && !line.starts_with("|-"))

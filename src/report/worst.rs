@@ -101,24 +101,40 @@ pub fn parameters(draws: &[DrawColumn], all: &[WorstCase]) -> Rows {
     rows
 }
 
-/// The keys that make a case what it is: those with the greatest share z ∂/∂z of the objective.
-pub fn keys(draws: &[DrawColumn], case: &WorstCase) -> String {
+/// Draws with their score and the share z ∂/∂z of the objective that is theirs, the most adverse first.
+fn shares(case: &WorstCase) -> Vec<(usize, f64, f64)> {
     let share =
         |(draw, by): (usize, &f64)| Some((draw, case.scores[draw]?, case.scores[draw]? * by));
     let mut all: Vec<(usize, f64, f64)> =
         case.by_score.iter().enumerate().filter_map(share).collect();
     all.sort_by(|a, b| a.2.total_cmp(&b.2));
+    all
+}
+
+/// The keys that make a case what it is: those with the greatest share z ∂/∂z of the objective.
+pub fn keys(draws: &[DrawColumn], case: &WorstCase) -> String {
     let mut text = String::new();
-    for (draw, score, share) in all.iter().take(KEYS).filter(|(_, _, share)| *share < 0.0) {
-        let key = &draws[*draw].key;
-        let share = significant(*share);
+    for (draw, score, share) in
+        shares(case).into_iter().take(KEYS).filter(|(.., share)| *share < 0.0)
+    {
+        let key = &draws[draw].key;
+        let share = significant(share);
         let _ = writeln!(text, "  {score:+.2} σ  {share:>10}  {key}");
     }
     text
 }
 
+/// Monte Carlo around the cases that were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Around {
+    /// Cases of each.
+    pub cases: u64,
+    /// Keys that are held: those with the greatest shares of the objective.
+    pub held: usize,
+}
+
 /// The cases as `[[fixed]]` tables of a run file; their values come back bit for bit.
-pub fn fixed(draws: &[DrawColumn], all: &[WorstCase]) -> String {
+pub fn fixed(draws: &[DrawColumn], all: &[WorstCase], around: Option<Around>) -> String {
     let mut text = String::from(
         "# Fixed cases found by tvse worst; append them to a run file. With `cases = N` and the keys to be\n\
          # drawn in `free`, Monte Carlo goes around them.\n",
@@ -126,12 +142,19 @@ pub fn fixed(draws: &[DrawColumn], all: &[WorstCase]) -> String {
     for case in all {
         let _ = write!(
             text,
-            "\n[[fixed]] # {}: damping ratio {}, {} sigma from the median\nname = \"{}\"\n[fixed.values]\n",
+            "\n[[fixed]] # {}: damping ratio {}, {} sigma from the median\nname = \"{}\"\n",
             case.method.name(),
             significant(case.damping_ratio()),
             significant(case.distance()),
             case.name
         );
+        if let Some(around) = around.filter(|_| !case.by_score.is_empty()) {
+            let free = shares(case).into_iter().skip(around.held);
+            let free: Vec<String> =
+                free.map(|(draw, ..)| format!("\"{}\"", draws[draw].key)).collect();
+            let _ = writeln!(text, "cases = {}\nfree = [{}]", around.cases, free.join(", "));
+        }
+        let _ = writeln!(text, "[fixed.values]");
         for &(draw, value) in &case.values {
             let _ = writeln!(text, "\"{}\" = {value:?}", draws[draw].key);
         }

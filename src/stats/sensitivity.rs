@@ -56,6 +56,18 @@ fn correlations(
     Ok((inverse, x.transpose() * y))
 }
 
+/// Standardised regression coefficients of a linear model, and the share R² of the variance that it
+/// explains.
+///
+/// # Errors
+/// As [`regression`].
+pub fn regression_points(columns: &[Vec<f64>], results: &[f64]) -> Result<(Vec<f64>, f64), Error> {
+    let (inverse, with) = correlations(columns, results)?;
+    let coefficients = &inverse * &with;
+    let explained = coefficients.dot(&with).clamp(0.0, 1.0);
+    Ok((coefficients.iter().copied().collect(), explained))
+}
+
 /// Standardised regression coefficients of a linear model, with Student's intervals of least squares
 /// (exact for a linear model with normal errors), and the share R² of the variance that it explains.
 ///
@@ -80,7 +92,23 @@ pub fn regression(
 }
 
 /// Partial rank correlations: between the ranks of an input and of the result, all other inputs'
-/// ranks being held. Intervals by Fisher's transformation with N − 2 − d degrees of freedom, d inputs.
+/// ranks being held.
+///
+/// # Errors
+/// As [`regression`].
+pub fn partial_rank_points(columns: &[Vec<f64>], results: &[f64]) -> Result<Vec<f64>, Error> {
+    checked(columns, results)?;
+    let ranked: Vec<Vec<f64>> = columns.iter().map(|column| ranks(column)).collect();
+    let (inverse, with) = correlations(&ranked, &ranks(results))?;
+    let coefficients = &inverse * &with;
+    let left = (1.0 - coefficients.dot(&with)).max(0.0);
+    // b/√(b² + left·inverse) is the partial correlation in terms of the regression.
+    let partial = |(i, &b): (usize, &f64)| b / (b * b + left * inverse[(i, i)]).sqrt();
+    Ok(coefficients.iter().enumerate().map(partial).collect())
+}
+
+/// [`partial_rank_points`] with intervals by Fisher's transformation, whose variance is (1 + r²/2)/(N − 2 − d)
+/// for ranks (Bonett and Wright, Psychometrika 65, 2000), d inputs.
 ///
 /// # Errors
 /// As [`regression`].
@@ -90,22 +118,15 @@ pub fn partial_ranks(
     confidence: Confidence,
     _: Independent,
 ) -> Result<Indices, Error> {
-    checked(columns, results)?;
-    let ranked: Vec<Vec<f64>> = columns.iter().map(|column| ranks(column)).collect();
-    let (inverse, with) = correlations(&ranked, &ranks(results))?;
-    let coefficients = &inverse * &with;
-    let left = (1.0 - coefficients.dot(&with)).max(0.0);
     let z = normal::upper_point(confidence.risk() / 2.0);
     // N − 3 of a plain correlation less the d − 1 inputs held.
-    let freedom = results.len().saturating_sub(columns.len() + 2).max(1);
-    let half = z / (freedom as f64).sqrt();
-    let indices = coefficients.iter().enumerate().map(|(i, &b)| {
-        // b/√(b² + left·inverse) is the partial correlation in terms of the regression.
-        let r = b / (b * b + left * inverse[(i, i)]).sqrt();
+    let freedom = results.len().saturating_sub(columns.len() + 2).max(1) as f64;
+    let with_interval = |r: f64| {
+        let half = z * ((1.0 + r * r / 2.0) / freedom).sqrt();
         let ends = ((r.atanh() - half).tanh(), (r.atanh() + half).tanh());
         Estimate::new(r, ends, Sides::Two, confidence, Method::Fisher)
-    });
-    Ok(indices.collect())
+    };
+    Ok(partial_rank_points(columns, results)?.into_iter().map(with_interval).collect())
 }
 
 /// Ranks from 1, the mean rank for equal values.
@@ -122,29 +143,95 @@ pub fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// First-order index of an input from any independent cases: the share of the variance between
-/// `bins` bins of equally many cases, less what chance puts there (ω² without its last correction).
-fn between_bins(bin: &[usize], results: &[f64], bins: usize, rows: &[f64]) -> f64 {
+/// First-order index of an input: the share of the variance between `bins` bins of equally many cases,
+/// less what chance puts there (ω² without its last correction) once for every `chance` that had a hand
+/// in it: one for cases, two for a resample of cases.
+fn between_bins(
+    (bin, bins): (&[usize], usize),
+    results: &[f64],
+    rows: impl IntoIterator<Item = usize>,
+    chance: f64,
+) -> f64 {
     let mut sums = vec![(0.0, 0.0); bins];
-    let (mut total, mut squares) = (0.0, 0.0);
-    for &row in rows {
-        let (b, y) = (bin[row as usize], results[row as usize]);
+    let (mut n, mut total, mut squares) = (0.0, 0.0, 0.0);
+    for row in rows {
+        let (b, y) = (bin[row], results[row]);
         sums[b].0 += 1.0;
         sums[b].1 += y;
+        n += 1.0;
         total += y;
         squares += y * y;
     }
-    let n = rows.len() as f64;
     let mean = total / n;
     let whole = squares - n * mean * mean;
     let filled: Vec<&(f64, f64)> = sums.iter().filter(|(count, _)| *count > 0.0).collect();
     let between: f64 = filled.iter().map(|(c, s)| c * (s / c - mean) * (s / c - mean)).sum();
     let (groups, within) = (filled.len() as f64, whole - between);
-    (between - (groups - 1.0) / (n - groups) * within) / whole
+    (between - chance * (groups - 1.0) / (n - groups) * within) / whole
 }
 
-/// First-order indices from given data (Plischke, Borgonovo and Smith 2013), corrected for the bias of
-/// bins, with percentile bootstrap intervals. `words` as for [`Bootstrap::estimate`].
+/// Cases from which indices are taken by bins.
+const LEAST_BINNED: usize = 100;
+
+/// How fine the bins of a given-data index are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bins {
+    /// Twice the root of the cases: what varies inside a bin is small beside the deviation of an index. Chance
+    /// puts as much between them as is taken off.
+    Fine,
+    /// Half the root of the cases: for designs, whose points lie more evenly in a bin than by chance, so that
+    /// too much is taken off; of coarse bins it is at most 1/(2√n).
+    Coarse,
+}
+
+/// The bin of each case by each input, and their number.
+fn binned(
+    columns: &[Vec<f64>],
+    results: &[f64],
+    fineness: Bins,
+) -> Result<(Vec<Vec<usize>>, usize), Error> {
+    checked(columns, results)?;
+    let cases = results.len();
+    if cases < LEAST_BINNED {
+        return Err(Error::TooFew { found: cases as u64, needed: LEAST_BINNED as u64 });
+    }
+    let per_root = match fineness {
+        Bins::Fine => 2.0,
+        Bins::Coarse => 0.5,
+    };
+    let bins = (per_root * (cases as f64).sqrt()).round() as usize;
+    let bin = |rank: &f64| ((rank - 0.5) * bins as f64 / cases as f64) as usize;
+    Ok((columns.iter().map(|column| ranks(column).iter().map(bin).collect()).collect(), bins))
+}
+
+/// First-order indices from given data (Plischke, Borgonovo and Smith 2013), corrected for what chance puts
+/// between bins.
+///
+/// # Errors
+/// As [`given_data`].
+pub fn given_data_points(
+    columns: &[Vec<f64>],
+    results: &[f64],
+    fineness: Bins,
+) -> Result<Vec<f64>, Error> {
+    let (all, bins) = binned(columns, results, fineness)?;
+    let centred = centred(results)?;
+    let index = |bin: Vec<usize>| between_bins((&bin, bins), &centred, 0..results.len(), 1.0);
+    let found: Vec<f64> = all.into_iter().map(index).collect();
+    match found.iter().all(|index| index.is_finite()) {
+        true => Ok(found),
+        false => Err(Error::Undefined("the result has the same value in all cases")),
+    }
+}
+
+/// Values less their mean, without which their squares lose digits.
+fn centred(values: &[f64]) -> Result<Vec<f64>, Error> {
+    let mean = Moments::of(values)?.mean().unwrap_or_default();
+    Ok(values.iter().map(|y| y - mean).collect())
+}
+
+/// [`given_data_points`] with percentile bootstrap intervals; what drawing again puts between bins, on top
+/// of what the cases have, is taken off each resample. `words` as for [`Bootstrap::estimate`].
 ///
 /// # Errors
 /// Fewer than 100 cases; results that are all equal.
@@ -155,27 +242,21 @@ pub fn given_data(
     mut words: impl FnMut() -> u64,
     independent: Independent,
 ) -> Result<Indices, Error> {
-    checked(columns, results)?;
-    let cases = results.len();
-    if cases < 100 {
-        return Err(Error::TooFew { found: cases as u64, needed: 100 });
-    }
-    // Half the root of the cases: bins fine enough for one wave or two, and what chance puts between
-    // them is taken off.
-    let bins = ((cases as f64).sqrt() / 2.0).round().clamp(4.0, 100.0) as usize;
+    let points = given_data_points(columns, results, Bins::Fine)?;
+    let (all, bins) = binned(columns, results, Bins::Fine)?;
     let bootstrap = Bootstrap::new(resamples, confidence, BootstrapInterval::Percentile)?;
-    let mean = Moments::of(results)?.mean().unwrap_or_default();
-    let centred: Vec<f64> = results.iter().map(|y| y - mean).collect();
-    let rows: Vec<f64> = (0..cases).map(|row| row as f64).collect();
-    let index = |column: &Vec<f64>| {
-        let bin: Vec<usize> = ranks(column)
-            .iter()
-            .map(|r| ((r - 0.5) * bins as f64 / cases as f64) as usize)
-            .collect();
-        let statistic = |rows: &mut [f64]| between_bins(&bin, &centred, bins, rows);
-        bootstrap.estimate(&rows, statistic, &mut words, independent)
+    let centred = centred(results)?;
+    let rows: Vec<f64> = (0..results.len()).map(|row| row as f64).collect();
+    let index = |(bin, point): (&Vec<usize>, f64)| {
+        let statistic = |rows: &mut [f64]| {
+            let rows = rows.iter().map(|row| *row as usize);
+            between_bins((bin, bins), &centred, rows, 2.0)
+        };
+        let found = bootstrap.estimate(&rows, statistic, &mut words, independent)?;
+        let ends = (found.lower(), found.upper());
+        Ok(Estimate::new(point, ends, Sides::Two, confidence, found.method()))
     };
-    columns.iter().map(index).collect()
+    all.iter().zip(points).map(index).collect()
 }
 
 /// Results of a Saltelli plan, row by row: of the first sample, the second, and the first with one
@@ -332,10 +413,80 @@ mod tests {
         let y: Vec<f64> = (0..8000).map(|i| ishigami([x[0][i], x[1][i], x[2][i]])).collect();
         let found = given_data(&x, &y, (400, confidence()), words(9), witness()).unwrap();
         for (found, [first, _]) in found.iter().zip(closed()) {
-            // 45 bins leave out the variation inside them, 0.7 % of the second index; the deviation of
-            // an index of 8000 cases is 0.01.
-            assert!((found.point() - first).abs() < 0.03, "{} {first}", found.point());
-            assert!(found.lower() - 0.01 < first && first < found.upper() + 0.01);
+            // The deviation of an index of 8000 cases is 0.01.
+            assert!((found.point() - first).abs() < 0.05, "{} {first}", found.point());
+            assert!(found.lower() - 0.02 < first && first < found.upper() + 0.02);
+        }
+    }
+
+    /// Misses among trials agree with a true rate of at most `most`: a correct program fails once in a
+    /// million, were the intervals of one trial independent.
+    fn assert_misses(misses: &[u64], trials: u64, most: f64) {
+        for (input, misses) in misses.iter().enumerate() {
+            let tail = binomial::at_least(*misses, trials, most);
+            assert!(tail > 1e-6, "input {input}: {misses} of {trials}");
+        }
+    }
+
+    fn missed(found: &Estimate, truth: f64) -> u64 {
+        u64::from(!(found.lower() <= truth && truth <= found.upper()))
+    }
+
+    #[test]
+    fn given_data_intervals_cover_strong_weak_and_absent_effects() {
+        // y = Σ b x + e of uniforms: S = b²/3 over the variance. The bootstrap is approximate and what
+        // varies inside a bin is left out: within four hundredths of the 5 % stated.
+        for (seed, cases, effects) in [(1, 150, [1.0, 0.5, 0.0]), (2, 400, [2.0, 0.1, 0.0])] {
+            let variance = effects.iter().map(|b: &f64| b * b / 3.0).sum::<f64>() + 0.09 / 3.0;
+            let mut misses = [0; 3];
+            for trial in 0..250 {
+                let x = inputs(1000 * seed + trial, 4, cases);
+                let y = |i: usize| {
+                    0.3 * x[3][i] + effects.iter().zip(&x).map(|(b, x)| b * x[i]).sum::<f64>()
+                };
+                let y: Vec<f64> = (0..cases).map(y).collect();
+                let words = words(7000 + trial);
+                let found = given_data(&x[..3], &y, (200, confidence()), words, witness()).unwrap();
+                for i in 0..3 {
+                    misses[i] += missed(&found[i], effects[i] * effects[i] / 3.0 / variance);
+                }
+            }
+            assert_misses(&misses, 250, 0.09);
+        }
+    }
+
+    #[test]
+    fn partial_rank_intervals_of_normal_variables_cover_the_correlation_of_the_population() {
+        // Jointly normal: rank correlations are 6/π asin(r/2), and the partial ones follow from their
+        // matrix. 5 % stated, within two hundredths; at N = 60 and 400.
+        for (seed, cases, by) in
+            [(1, 60, [0.2, 0.4, 0.0]), (2, 60, [0.9, 0.2, 0.1]), (3, 400, [0.5; 3])]
+        {
+            let rest = (1.0 - by.iter().map(|b| b * b).sum::<f64>()).sqrt();
+            let mut matrix = DMatrix::<f64>::identity(4, 4);
+            for i in 0..3 {
+                let rank = 6.0 / PI * (by[i] / 2.0_f64).asin();
+                (matrix[(i, 3)], matrix[(3, i)]) = (rank, rank);
+            }
+            let inverse = matrix.try_inverse().unwrap();
+            let mut misses = [0; 3];
+            let trials = 1500;
+            for trial in 0..trials {
+                let x: Vec<Vec<f64>> = inputs(10_000 * seed + trial, 4, cases)
+                    .into_iter()
+                    .map(|c| c.into_iter().map(|u| normal::upper_point((1.0 + u) / 2.0)).collect())
+                    .collect();
+                let y = |i: usize| {
+                    rest * x[3][i] + by.iter().zip(&x).map(|(b, x)| b * x[i]).sum::<f64>()
+                };
+                let y: Vec<f64> = (0..cases).map(y).collect();
+                let found = partial_ranks(&x[..3], &y, confidence(), witness()).unwrap();
+                for i in 0..3 {
+                    let truth = -inverse[(i, 3)] / (inverse[(i, i)] * inverse[(3, 3)]).sqrt();
+                    misses[i] += missed(&found[i], truth);
+                }
+            }
+            assert_misses(&misses, trials, 0.07);
         }
     }
 

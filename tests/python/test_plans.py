@@ -309,14 +309,73 @@ def test_regression_and_partial_ranks_are_those_of_openturns(small, folder):
     analysis = ot.CorrelationAnalysis(x, y)
     for name, expected in [("src", analysis.computeSRC()), ("prcc", analysis.computePRCC())]:
         for key, value in zip(KEYS, expected):
-            row = next(r for r in rows if r["draw key"] == key)
+            row = next(r for r in rows if r["key"] == key)
             assert float(row[name]) == pytest.approx(value, abs=1e-8)
             assert float(row[name + "_low"]) < value < float(row[name + "_high"])
     strength = [abs(float(r["src"])) for r in rows]
     assert strength == sorted(strength, reverse=True)
-    low = cases[small.columns[rows[0]["draw key"]]].to_numpy()
+    low = cases[small.columns[rows[0]["key"]]].to_numpy()
     chosen = low <= np.quantile(low, 0.1)
     assert float(rows[0]["at_low"]) == pytest.approx(cases[METRIC].to_numpy()[chosen].mean(), rel=1e-9)
+
+
+def between_bins(x, y):
+    """First-order index by bins of equal count: their share of the variance less that of chance."""
+    n = len(y)
+    bins = round(2 * np.sqrt(n))
+    label = np.floor((scipy.stats.rankdata(x) - 0.5) * bins / n).astype(int)
+    groups = [y[label == b] for b in range(bins)]
+    anova = scipy.stats.f_oneway(*groups).statistic
+    within = sum(((g - g.mean()) ** 2).sum() for g in groups)
+    between = anova * (bins - 1) * within / (n - bins)
+    return (between - (bins - 1) * within / (n - bins)) / (between + within)
+
+
+def test_given_data_indices_are_those_of_an_analysis_of_variance_and_near_openturns(small, folder):
+    """Exactly those of scipy's F; within 0.2 (four deviations of 300 cases) of another estimator."""
+    rows = lines("sensitivity", small.folder, "--metric", METRIC, "-o", folder / "g.csv")
+    cases = small.table("cases").query("population == 'dispersed'")
+    x = np.ascontiguousarray(cases[[small.columns[key] for key in KEYS]].to_numpy())
+    y = cases[METRIC].to_numpy()
+    other = ot.RankSobolSensitivityAlgorithm(ot.Sample(x), ot.Sample(y[:, None])).getFirstOrderIndices()
+    for place, key in enumerate(KEYS):
+        row = next(r for r in rows if r["key"] == key)
+        found = float(row["first_order"])
+        assert found == pytest.approx(between_bins(x[:, place], y), abs=1e-9)
+        assert found == pytest.approx(other[place], abs=0.2)
+        assert float(row["first_order_low"]) < found < float(row["first_order_high"])
+        assert float(row["change_per_sigma"]) == pytest.approx(float(row["src"]) * y.std(ddof=1))
+        assert row["intervals"] == "independent_cases" and row["metric"] == METRIC
+    kept = list(csv.DictReader((small.folder / "analysis/sensitivity.csv").open()))
+    assert kept == rows
+
+
+@pytest.mark.parametrize("kind, replicates", [("latin_hypercube", 3), ("sobol", 4), ("sobol", 1)])
+def test_indices_of_designs_have_students_intervals_over_replicates_or_none(runs, folder, kind, replicates):
+    plan = f'kind = "{kind}"\nreplicates = {replicates}'
+    run = runs(f"indices_{kind}_{replicates}", scenario("small", 96, plan))
+    rows = lines("sensitivity", run.folder, "--metric", METRIC, "-o", folder / "d.csv")
+    cases = run.table("cases").query("population == 'dispersed'")
+
+    def indices(part):
+        x = ot.Sample(np.ascontiguousarray(part[[run.columns[key] for key in KEYS]].to_numpy()))
+        analysis = ot.CorrelationAnalysis(x, ot.Sample(part[[METRIC]].to_numpy()))
+        return {"src": np.array(analysis.computeSRC()), "prcc": np.array(analysis.computePRCC())}
+
+    whole = indices(cases)
+    each = [indices(cases[cases.case % replicates == r]) for r in range(replicates)]
+    for place, key in enumerate(KEYS):
+        row = next(r for r in rows if r["key"] == key)
+        for name in ["src", "prcc"]:
+            assert float(row[name]) == pytest.approx(whole[name][place], abs=1e-8)
+            if replicates == 1:
+                assert row[name + "_low"] == "" and row["intervals"] == "none"
+                continue
+            values = [of[name][place] for of in each]
+            low, high = scipy.stats.ttest_1samp(values, 0).confidence_interval(0.95)
+            assert float(row[name + "_low"]) == pytest.approx(low, abs=1e-8)
+            assert float(row[name + "_high"]) == pytest.approx(high, abs=1e-8)
+            assert row["intervals"] == "replicates"
 
 
 def test_crossed_indices_are_the_estimators_and_agree_with_openturns(runs, folder):
@@ -331,7 +390,7 @@ def test_crossed_indices_are_the_estimators_and_agree_with_openturns(runs, folde
     outputs = (y - y[:, :2].mean()).T.reshape(-1, 1)
     jansen = ot.JansenSensitivityAlgorithm(ot.Sample(stacked), ot.Sample(outputs), 120)
     for place, key in enumerate(order):
-        row = next(r for r in rows if r["draw key"] == key)
+        row = next(r for r in rows if r["key"] == key)
         crossed = y[:, 2 + place]
         total = np.mean((first - crossed) ** 2) / 2 / variance
         index = np.mean((second - y[:, :2].mean()) * (crossed - first)) / variance
@@ -365,6 +424,25 @@ def test_outer_draws_hold_what_is_known_and_have_their_statements(runs, folder):
     low, high = scipy.stats.binomtest(met, 6).proportion_ci(0.95, "exact")
     found = (whole.outer_share_met_low, whole.outer_share_met_high)
     assert whole.outer_met == met and found == pytest.approx((low, high), rel=1e-9, abs=1e-12)
+    text = """
+[[gate]]
+id = "outer"
+metric = "damping_ratio"
+variant = "jet_damping"
+statistic = "nested_statement"
+threshold_1 = 0.0
+at_least_percent = 30.0
+confidence = 0.9
+rationale = "test"
+"""
+    (folder / "nested.gates.toml").write_text(text)
+    done = subprocess.run([TVSE, "gate", run.folder, "--gates", folder / "nested.gates.toml"], capture_output=True)
+    gate = json.loads((run.folder / "gates.json").read_text())["gates"][0]
+    assert (gate["cases"], gate["violations"], gate["value"]) == (6, 6 - met, pytest.approx(100 * met / 6))
+    passes = scipy.stats.binom.cdf(6 - met, 6, 0.7) <= 0.1
+    fails = scipy.stats.binom.sf(5 - met, 6, 0.7) <= 0.1
+    assert gate["verdict"] == ("pass" if passes else "fail" if fails else "inconclusive")
+    assert done.returncode == {"pass": 0, "fail": 1, "inconclusive": 4}[gate["verdict"]]
     means = cases.groupby("outer")[METRIC].mean()
     low, high = scipy.stats.ttest_1samp(means, 0).confidence_interval(0.95)
     assert (whole.damping_ratio_mean_low, whole.damping_ratio_mean_high) == pytest.approx((low, high), rel=1e-9)

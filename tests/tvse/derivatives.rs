@@ -419,6 +419,58 @@ fn on_a_small_vehicle_the_search_equals_an_exhaustive_grid_and_the_planted_corne
 }
 
 #[test]
+fn the_search_of_the_damping_that_feedback_adds_is_no_worse_than_a_grid() {
+    let loaded = loaded();
+    let vehicle = &loaded.vehicle.vehicle;
+    let normal = |path: &str, level: &str, sigma: f64| {
+        let sigma = format!("sigma = {sigma}");
+        row(path, level, "").replace("sigma = 0.01", &sigma)
+    };
+    let text = normal("autopilot.path.*.gain", "vehicle", 0.1)
+        + &normal("booster.*.actuator.*.stiffness", "vehicle", 0.1)
+        + &normal("modes.*.frequency", "vehicle", 0.03);
+    let dispersion = dispersion::read("test", &text, vehicle).unwrap();
+    let named = |name: &str| {
+        loaded.definition.variants.iter().find(|variant| variant.name == name).unwrap().clone()
+    };
+    let definition = at_105(&loaded, vec![named("open"), named("closed")]);
+    let sampler = Sampler::new(&dispersion, 1);
+    let evaluator = Evaluator::new(vehicle, &sampler, &definition, false).unwrap();
+    let aim = Aim { variant: 1, baseline: Some(0), mode: 0, quantity: Quantity::DampingRatio };
+    let plan = worst::Plan {
+        aim,
+        flight_times: vec![0],
+        box_sigma: 2.0,
+        radius_sigma: 2.0,
+        corner_keys: 3,
+        starts: Vec::new(),
+    };
+    let go = AtomicBool::new(false);
+    let (cases, _) = worst::search(&evaluator, &dispersion, &definition, &plan, &go).unwrap();
+    let objective =
+        Objective { evaluator: &evaluator, dispersion: &dispersion, aim, flight_time: 0 };
+    let score = |i: usize| -2.0 + i as f64;
+    let mut least = f64::INFINITY;
+    for i in 0..125 {
+        let z = [score(i % 5), score(i / 5 % 5), score(i / 25)];
+        // What feedback adds is the difference of the two variants on the same draws.
+        let value = objective.value(&z.map(Some)).unwrap();
+        let alone = |variant: usize| {
+            let aim = Aim { variant, baseline: None, ..aim };
+            let of =
+                Objective { evaluator: &evaluator, dispersion: &dispersion, aim, flight_time: 0 };
+            of.value(&z.map(Some)).unwrap()
+        };
+        if i % 31 == 0 {
+            assert_eq!(value, alone(1) - alone(0));
+        }
+        least = least.min(value);
+    }
+    let found = cases.iter().find(|case| case.method == Method::Box).unwrap();
+    assert!(found.objective <= least + 1e-9, "{} {least}", found.objective);
+}
+
+#[test]
 fn a_run_stores_derivatives_and_its_worst_cases_are_found_replayed_and_added_to_another_run() {
     let study = Study::new();
     let sensitivity = "[sensitivity]\nvariants = [\"jet_damping\"]\ncases = 4\n";
@@ -439,7 +491,8 @@ fn a_run_stores_derivatives_and_its_worst_cases_are_found_replayed_and_added_to_
     assert!(said.out.contains("jet_damping at 110 s, mode tvse: 4 cases"), "{}", said.out);
 
     let worst = ["worst", "run", "--variant", "jet_damping", "--corners", "3", "--starts", "1"];
-    let said = study.said(&[&worst[..], &["--output", "fixed.toml"]].concat());
+    let said = study
+        .said(&[&worst[..], &["--output", "fixed.toml", "--around", "3", "--hold", "2"]].concat());
     assert_eq!(said.code, 0, "{said:?}");
     assert!(said.out.contains("selected by their result"), "{}", said.out);
     for file in ["worst.csv", "parameters.csv", "fixed.toml", "worst.json"] {
@@ -452,21 +505,40 @@ fn a_run_stores_derivatives_and_its_worst_cases_are_found_replayed_and_added_to_
     assert_eq!(said.code, 2);
     assert!(said.err.contains("did you mean `jet_damping_tvse_box`"), "{}", said.err);
 
+    // A gate holds the worst case found against a limit; a search of another size was not made.
+    let json = study.text("run/worst/jet_damping_tvse/worst.json");
+    let found: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let cases = found["cases"].as_array().unwrap();
+    let of = |method: &str| cases.iter().find(|case| case["method"] == method).unwrap();
+    let least = |methods: &[&str]| {
+        let all = methods.iter().map(|method| of(method)["objective"].as_f64().unwrap());
+        all.fold(f64::INFINITY, f64::min)
+    };
+    let in_box = least(&["vertex", "corners", "box"]);
+    for (region, sigma, limit, code) in [
+        ("box", 3.0, in_box - 1e-4, 0),
+        ("box", 3.0, in_box + 1e-9, 1),
+        ("ellipsoid", 3.0, least(&["ellipsoid"]) - 1e-4, 0),
+        ("box", 4.0, -1.0, 3),
+    ] {
+        let gate = format!(
+            "[[gate]]\nid = \"worst\"\nmetric = \"damping_ratio\"\nvariant = \"jet_damping\"\n\
+             statistic = \"worst_on_worst\"\nregion = \"{region}\"\nsigma = {sigma}\n\
+             at_least_1 = {limit:?}\nrationale = \"test\"\n"
+        );
+        std::fs::write(study.path("worst.gates.toml"), gate).unwrap();
+        let said = study.said(&["gate", "run", "--gates", "worst.gates.toml"]);
+        assert_eq!(said.code, code, "{region} {sigma} {limit}: {said:?}");
+    }
+
     // The cases join another run, with Monte Carlo around one of them.
-    let fixed = study.text("fixed.toml").replacen(
-        "name = \"jet_damping_tvse_box\"\n",
-        "name = \"jet_damping_tvse_box\"\ncases = 3\nfree = [\"modes.*.frequency\"]\n",
-        1,
-    );
+    let fixed = study.text("fixed.toml");
     let text = study.text("runs/smoke.toml").replacen(sensitivity, "", 1);
     std::fs::write(study.path("runs/next.toml"), text + &fixed).unwrap();
     let said = study.said(&["run", "runs/next.toml", "-o", "next"]);
     assert_eq!(said.code, 0, "{said:?}");
     let modes = columns(&study.path("next/tables/modes.parquet"));
-    let json = study.text("run/worst/jet_damping_tvse/worst.json");
-    let found: serde_json::Value = serde_json::from_str(&json).unwrap();
-    let cases = found["cases"].as_array().unwrap();
-    let of_box = cases.iter().find(|case| case["method"] == "box").unwrap();
+    let of_box = of("box");
     let texts = |name: &str| modes.texts[name].iter().map(|t| t.as_deref().unwrap());
     let rows = texts("population").zip(texts("variant")).zip(&modes.numbers["pole_re_rad_s"]);
     let mut same = 0;

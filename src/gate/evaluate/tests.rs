@@ -1,9 +1,9 @@
 //! Verdicts of gates on planted cases.
 
 use super::super::outcome::Report;
-use super::super::source::{Metric, Population, Table};
+use super::super::source::{Metric, NestedPlan, Population, Table};
 use super::*;
-use crate::gate::parse;
+use crate::gate::{Region, parse};
 use crate::problem::Kind;
 use crate::stats::Drawing;
 
@@ -12,12 +12,15 @@ struct Planted {
     values: Vec<Result<Option<f64>, String>>,
     planned: u64,
     drawing: Drawing,
+    nested: Option<NestedPlan>,
+    searched: Option<Searched>,
 }
 
 impl Planted {
     fn new(values: Vec<Result<Option<f64>, String>>) -> Self {
         let planned = values.len() as u64;
-        Self { values, planned, drawing: Drawing::Independent }
+        let drawing = Drawing::Independent;
+        Self { values, planned, drawing, nested: None, searched: None }
     }
 
     /// `n` good cases, the first `bad` of them at −0.01 and the others at 0.01.
@@ -46,8 +49,18 @@ impl Names for Planted {
 
     fn populations(&self) -> Vec<Population> {
         vec![
-            Population { name: "nominal".into(), planned: 1, drawing: Drawing::Designed },
-            Population { name: "dispersed".into(), planned: self.planned, drawing: self.drawing },
+            Population {
+                name: "nominal".into(),
+                planned: 1,
+                drawing: Drawing::Designed,
+                nested: None,
+            },
+            Population {
+                name: "dispersed".into(),
+                planned: self.planned,
+                drawing: self.drawing,
+                nested: self.nested,
+            },
         ]
     }
 
@@ -65,6 +78,16 @@ impl Names for Planted {
 }
 
 impl Source for Planted {
+    fn worst(
+        &self,
+        query: &Query<'_>,
+        region: Region,
+        sigma: f64,
+    ) -> Result<Option<Searched>, Problems> {
+        assert_eq!((query.variant, query.mode), (Some("jet_damping"), Some("tvse")));
+        Ok(self.searched.clone().filter(|_| region == Region::Box && sigma == 3.0))
+    }
+
     fn visit(
         &self,
         query: &Query<'_>,
@@ -371,4 +394,92 @@ fn a_report_has_the_combined_verdict_and_follows_its_schema() {
     assert_eq!(json["gates"][1]["verdict"], "inconclusive");
     let empty = Report::new(vec![]);
     assert_eq!((empty.verdict, empty.exit_code), (Verdict::Incomplete, 3));
+}
+
+const NESTED: &str =
+    "statistic = 'nested_statement'\nthreshold_1 = 0.0\nat_least_percent = 50\nconfidence = 0.9";
+
+/// Outer draws of 30 cases, with so many bad ones; a tenth may be bad at a risk of a tenth.
+fn outer(bad: &[usize]) -> Planted {
+    let cases = bad.iter().flat_map(|bad| Planted::of(30, *bad).values);
+    let nested = Some(NestedPlan { inner: 30, allowed_share: 0.1, risk: 0.1 });
+    Planted { drawing: Drawing::Nested, nested, ..Planted::new(cases.collect()) }
+}
+
+#[test]
+fn a_nested_gate_counts_outer_draws_whose_statement_is_shown() {
+    // 0.9^30 = 0.042 and P(X ≤ 1) = 0.184: only an outer draw without a bad case shows it.
+    let outcome = one(NESTED, &outer(&[0, 0, 1, 0, 0, 0]));
+    assert_eq!((outcome.cases, outcome.violations), (6, 1));
+    assert!((outcome.value.unwrap() - 500.0 / 6.0).abs() < 1e-9);
+    // P(X ≤ 1 | 6, 0.5) = 7/64 > 0.1; seven with one: 8/128.
+    assert_eq!(outcome.verdict, Verdict::Inconclusive);
+    assert!(outcome.message.contains("1 of 6 outer draws"), "{}", outcome.message);
+    let outcome = one(NESTED, &outer(&[0, 0, 2, 0, 0, 0, 0]));
+    assert_eq!((outcome.verdict, outcome.confidence), (Verdict::Pass, Some(0.9)));
+    // The outer draw is called by its first case, with the share of its bad ones.
+    assert_eq!((outcome.worst_case, outcome.worst_value), (Some(60), Some(2.0 / 30.0)));
+    assert_eq!(one(NESTED, &outer(&[9; 7])).verdict, Verdict::Fail);
+    // A failed case is bad, and an outer draw that is not whole is missing.
+    let mut failed = outer(&[0; 7]);
+    failed.values[0] = Err("draw".into());
+    assert_eq!(one(NESTED, &failed).violations, 1);
+    let mut part = outer(&[0; 7]);
+    part.values.truncate(200);
+    let outcome = one(NESTED, &part);
+    assert_eq!((outcome.verdict, outcome.missing, outcome.cases), (Verdict::Incomplete, 1, 6));
+}
+
+#[test]
+fn a_nested_gate_needs_a_nested_plan_and_a_limit_from_below() {
+    let text = format!("{HEAD}{NESTED}");
+    let gates = parse(&text, "gates.toml").unwrap();
+    let problems = evaluate(&gates, &Planted::of(60, 0), "gates.toml").unwrap_err();
+    assert!(problems.to_string().contains("a population with a nested plan"), "{problems}");
+    let problems = parse(&text.replace("at_least", "at_most"), "gates.toml").unwrap_err();
+    assert!(problems.to_string().contains("gate[0].limit"), "{problems}");
+}
+
+const WORST: &str =
+    "statistic = 'worst_on_worst'\nregion = 'box'\nsigma = 3\nat_least_percent = 1.0";
+
+#[test]
+fn a_worst_on_worst_gate_holds_the_worst_case_found_and_what_the_search_left() {
+    let with = |value: f64, at_worst: f64| {
+        let (value, at_worst) = (Some(value), Some(at_worst));
+        let searched = Some(Searched { name: "a_box".into(), value, at_worst, cases: 3 });
+        Planted { searched, ..Planted::of(10, 10) }
+    };
+    let outcome = one(WORST, &with(0.012, 0.011));
+    assert_eq!((outcome.verdict, outcome.confidence), (Verdict::Pass, None));
+    assert_eq!((outcome.value, outcome.cases), (Some(1.2), 3));
+    assert!(outcome.message.contains("--worst a_box"), "{}", outcome.message);
+    assert_eq!(one(WORST, &with(0.012, 0.009)).verdict, Verdict::Inconclusive);
+    assert_eq!(one(WORST, &with(0.009, 0.009)).verdict, Verdict::Fail);
+    assert_eq!(one(WORST, &with(f64::NAN, f64::NAN)).verdict, Verdict::Fail);
+    // Nothing was searched, or elsewhere: no pass.
+    assert_eq!(one(WORST, &Planted::of(10, 0)).verdict, Verdict::Incomplete);
+    let other = WORST.replace("box", "ellipsoid");
+    assert_eq!(one(&other, &with(0.5, 0.5)).verdict, Verdict::Incomplete);
+    // A stable worst case has no time to double.
+    let stable = Planted {
+        searched: Some(Searched { name: "a".into(), value: None, at_worst: None, cases: 1 }),
+        ..Planted::of(1, 0)
+    };
+    let text = format!("{HEAD}{}", WORST.replace("percent = 1.0", "s = 5"))
+        .replace("damping_ratio", "time_to_double_s");
+    assert_eq!(evaluate_text(&text, &stable)[0].verdict, Verdict::Pass);
+}
+
+#[test]
+fn a_worst_on_worst_gate_says_which_search_it_means() {
+    let problems = parse(&format!("{HEAD}{}", "statistic = 'worst_on_worst'\nat_least_1 = 0"), "g");
+    let text = problems.unwrap_err().to_string();
+    assert!(text.contains("gate[0].region") && text.contains("gate[0].sigma"), "{text}");
+    let text = format!("{HEAD}{WORST}").replace("damping_ratio", "pole_re_rad_s");
+    let gates = parse(&text.replace("percent", "rad_s"), "g").unwrap();
+    let problems = evaluate(&gates, &Planted::of(1, 0), "g").unwrap_err();
+    assert!(problems.to_string().contains("what tvse worst searches"), "{problems}");
+    let problems = parse(&format!("{HEAD}{MINIMUM}\nregion = 'box'"), "g").unwrap_err();
+    assert!(problems.to_string().contains("gate[0].region"), "{problems}");
 }

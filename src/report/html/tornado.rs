@@ -126,7 +126,7 @@ fn figure(contents: &Contents, metric: &str, cases: usize, ranking: &Ranking) ->
         let said = effect
             .total
             .or(effect.first_order)
-            .map_or(String::new(), |index| format!("{} %", percent(index.point().max(0.0), 0)));
+            .map_or(String::new(), |index| format!("{} %", percent(index.value.max(0.0), 0)));
         panel.text((x[1], at), (10.0, 4.0), "start", "small note", &said);
     }
     panel.upright(100.0 * middle, "zero");
