@@ -69,6 +69,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let sections = sections(&contents);
     let title = format!("tvse report: {}", contents.outline.definition.name);
     let subtitle = contents.vehicle.clone().unwrap_or_default();
+    files::create_parents(&target)?;
     files::write(&target, page(&title, &subtitle, &sections).as_bytes())?;
     writeln!(out, "{}", target.display())?;
     if let Some(folder) = &args.figures {

@@ -178,6 +178,12 @@ def test_it_prints(browser, report):
     with Opened(browser, report) as opened:
         pdf = opened.page.pdf(format="A4")
         assert pdf.startswith(b"%PDF") and len(pdf) > 50_000
+    # On white, even from a dark screen.
+    with Opened(browser, report, color_scheme="dark") as opened:
+        opened.page.emulate_media(media="print")
+        ground = opened.page.evaluate("() => getComputedStyle(document.body).backgroundColor")
+        text = opened.page.evaluate("() => getComputedStyle(document.querySelector('figure svg text')).fill")
+        assert (ground, text) == ("rgb(255, 255, 255)", "rgb(34, 34, 34)")
 
 
 def test_the_mode_shape_moves_unless_motion_is_not_wanted(browser, report):
