@@ -21,7 +21,7 @@ const LAYERS: [&[&str]; 10] = [
 ];
 
 /// Third parties and the modules that may name them.
-const WALLS: [(&str, &[&str]); 10] = [
+const WALLS: [(&str, &[&str]); 11] = [
     ("faer::linalg", &["modal", "structure"]),
     ("arrow::", &["io"]),
     ("parquet::", &["io"]),
@@ -32,6 +32,7 @@ const WALLS: [(&str, &[&str]); 10] = [
     ("comfy_table::", &["report"]),
     ("quick_junit::", &["report"]),
     ("indicatif::", &["cli"]),
+    ("resvg::", &["report"]),
 ];
 
 fn sources(folder: &Path, found: &mut Vec<PathBuf>) {

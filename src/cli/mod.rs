@@ -25,7 +25,9 @@ pub mod part;
 pub mod plan;
 pub mod planar;
 pub mod progress;
+pub mod reference;
 pub mod replay;
+pub mod report;
 pub mod response;
 pub mod retry;
 pub mod run;
@@ -84,6 +86,7 @@ enum Command {
     Sensitivity(sensitivity::Args),
     Compare(compare::Args),
     Gate(gate::Args),
+    Report(report::Args),
     Replay(replay::Args),
     Worst(worst::Args),
     Influence(influence::Args),
@@ -93,6 +96,7 @@ enum Command {
     Margins(margins::Args),
     Actuator(actuator::Args),
     Schema(schema::Args),
+    Reference(reference::Args),
     Completions(completions::Args),
 }
 
@@ -164,6 +168,7 @@ pub fn run() -> ExitCode {
         Command::Sensitivity(args) => sensitivity::run(args, &mut out),
         Command::Compare(args) => compare::run(args, &mut out),
         Command::Gate(args) => gate::run(args, &mut out),
+        Command::Report(args) => report::run(args, &mut out),
         Command::Replay(args) => replay::run(args, &mut out),
         Command::Worst(args) => worst::run(args, &mut out),
         Command::Influence(args) => influence::run(args, &mut out),
@@ -173,6 +178,7 @@ pub fn run() -> ExitCode {
         Command::Margins(args) => margins::run(args, &mut out),
         Command::Actuator(args) => actuator::run(args, &mut out),
         Command::Schema(args) => schema::run(args, &mut out),
+        Command::Reference(args) => reference::run(args, &mut out),
         Command::Completions(args) => completions::run(args, &mut out),
     };
     let code = match result.and_then(|code| Ok(out.flush().map(|()| code)?)) {

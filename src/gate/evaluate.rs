@@ -52,7 +52,7 @@ fn worst(gate: &Gate) -> Worst {
 
 /// Hands the cases of a gate to `visit`; of a nested plan one for each outer draw that is whole, called by
 /// its first case, with the share of its cases that are bad: below the threshold, failed or without a value.
-fn visit(
+fn values(
     gate: &Gate,
     plan: &Plan<'_>,
     source: &impl Source,
@@ -148,7 +148,7 @@ impl Cases {
             Self { count: 0, failures: 0, violations: 0, worst, offenders, order, sign };
         let mut last = None;
         let mut sound = true;
-        visit(gate, plan, source, query, &mut |case| {
+        values(gate, plan, source, query, &mut |case| {
             sound &= last < Some(case.case) && case.case < plan.population.planned;
             last = Some(case.case);
             let case = checked(case);
@@ -183,7 +183,7 @@ impl Cases {
         let asked = ranks(plan, cases.count);
         let ranks: Vec<u64> = asked.into_iter().filter(|rank| *rank < cases.count).collect();
         while !cases.order.end_pass(&ranks) {
-            visit(gate, plan, source, query, &mut |case| {
+            values(gate, plan, source, query, &mut |case| {
                 cases.order.push(badness(&checked(case)));
                 Ok(())
             })?;
@@ -243,9 +243,10 @@ fn breaks(gate: &Gate, value: &Result<Option<f64>, String>) -> bool {
     }
 }
 
-fn outcome(gate: &Gate, plan: &Plan<'_>, source: &impl Source) -> Result<Outcome, Problems> {
+/// What a gate asks of a run.
+fn query<'a>(gate: &'a Gate, plan: &Plan<'a>) -> Query<'a> {
     let selection = &gate.selection;
-    let query = Query {
+    Query {
         metric: plan.metric,
         population: &selection.population,
         variant: selection.variant.as_deref(),
@@ -257,7 +258,26 @@ fn outcome(gate: &Gate, plan: &Plan<'_>, source: &impl Source) -> Result<Outcome
             Statistic::NestedStatement { .. } => Worst::Smallest,
             _ => worst(gate),
         },
-    };
+    }
+}
+
+/// Hands the value of every case that a gate read from `file` looks at to `visit`.
+///
+/// # Errors
+/// As [`evaluate`], and what `visit` returns.
+pub fn visit(
+    gate: &Gate,
+    source: &impl Source,
+    file: &str,
+    visit: &mut dyn FnMut(CaseValue) -> Result<(), Problems>,
+) -> Result<(), Problems> {
+    let run = Run::of(source);
+    let plans = resolve(std::slice::from_ref(gate), &run, file)?;
+    plans.iter().try_for_each(|plan| values(gate, plan, source, &query(gate, plan), visit))
+}
+
+fn outcome(gate: &Gate, plan: &Plan<'_>, source: &impl Source) -> Result<Outcome, Problems> {
+    let query = query(gate, plan);
     if let Statistic::WorstOnWorst { region, sigma } = gate.statistic {
         return Ok(searched(gate, plan, source.worst(&query, region, sigma)?));
     }

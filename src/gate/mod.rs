@@ -11,7 +11,7 @@ mod rule;
 mod source;
 mod verdict;
 
-pub use evaluate::{check, evaluate};
+pub use evaluate::{check, evaluate, visit};
 pub use outcome::{Offender, Outcome, Report, report_schema};
 pub use raw::{RawGate, RawGates, RawSeverity, RawStatistic, Region, schema};
 pub use rule::{Gate, Limit, Quantity, Selection, Sense, Statistic, parse};

@@ -240,7 +240,6 @@ fn of_modes(
     last.map_or(Ok(()), |last| finish(last, &mut places))
 }
 
-/// What takes a number from a row of the table `modes`.
 type Getter = Box<dyn Fn(&ModeRow) -> Option<f64>>;
 
 /// How a metric is taken from a row of the table `modes`.

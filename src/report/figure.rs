@@ -126,7 +126,7 @@ fn padded(rest: &[Vector3<f64>], moved: &[Vector3<f64>], k: usize) -> (f64, f64)
 }
 
 /// Grids joined by their names, each row in the order of x; the others alone.
-fn lines(set: &ModeSet) -> Vec<Vec<usize>> {
+pub(super) fn lines(set: &ModeSet) -> Vec<Vec<usize>> {
     let mut rows: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
     let mut alone = Vec::new();
     for (i, grid) in set.grids.iter().enumerate() {

@@ -3,7 +3,7 @@
 use crate::study::{Study, said};
 use std::path::Path;
 
-const COMMANDS: [&str; 27] = [
+const COMMANDS: [&str; 29] = [
     "init",
     "check",
     "plan",
@@ -20,6 +20,7 @@ const COMMANDS: [&str; 27] = [
     "sensitivity",
     "compare",
     "gate",
+    "report",
     "replay",
     "worst",
     "influence",
@@ -30,6 +31,7 @@ const COMMANDS: [&str; 27] = [
     "actuator",
     "model",
     "schema",
+    "reference",
     "completions",
 ];
 

@@ -17,6 +17,7 @@ mod import;
 mod outside;
 mod parsers;
 mod repeatability;
+mod report;
 mod schema;
 mod servo;
 mod stopping;
