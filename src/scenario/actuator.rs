@@ -147,15 +147,16 @@ fn transfer_function(
         & command.as_ref().is_none_or(|command| {
             held(&format!("{key}.command_denominator"), &command.state_space(), findings)
         });
-    stable.then(|| ()).map(|()| {
-        Law::TransferFunction(TransferActuator {
-            command,
-            stiffness,
-            damping_n_m_s_rad: file.damping_n_m_s_rad,
-            gain: 1.0,
-            time_scale: 1.0,
-        })
-    })
+    if !stable {
+        return None;
+    }
+    Some(Law::TransferFunction(TransferActuator {
+        command,
+        stiffness,
+        damping_n_m_s_rad: file.damping_n_m_s_rad,
+        gain: 1.0,
+        time_scale: 1.0,
+    }))
 }
 
 /// Whether an actuator is stable with its nozzle held: poles left of the imaginary axis, or at zero.
@@ -186,17 +187,18 @@ fn state_space(key: &str, file: &StateSpaceFile, findings: &mut Findings) -> Opt
     }
     size("b".into(), file.b.len(), "rows");
     size("c".into(), file.c.len(), "entries");
-    good.then(|| {
-        Law::StateSpace(StateSpaceActuator {
-            system: Arc::new(StateSpace {
-                a: DMatrix::from_fn(n, n, |i, j| file.a[i][j]),
-                b: DMatrix::from_fn(n, 3, |i, j| file.b[i][j]),
-                c: DMatrix::from_fn(1, n, |_, j| file.c[j]),
-                d: DMatrix::from_row_slice(1, 3, &file.d),
-            }),
-            gain: 1.0,
-            time_scale: 1.0,
-        })
+    if !good {
+        return None;
+    }
+    let system = StateSpace {
+        a: DMatrix::from_fn(n, n, |i, j| file.a[i][j]),
+        b: DMatrix::from_fn(n, 3, |i, j| file.b[i][j]),
+        c: DMatrix::from_fn(1, n, |_, j| file.c[j]),
+        d: DMatrix::from_row_slice(1, 3, &file.d),
+    };
+    held(&format!("{key}.state_space.a"), &system, findings).then(|| {
+        let system = Arc::new(system);
+        Law::StateSpace(StateSpaceActuator { system, gain: 1.0, time_scale: 1.0 })
     })
 }
 
