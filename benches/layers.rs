@@ -8,6 +8,7 @@ use tvse::dispersion::Sampler;
 use tvse::dynamics::{Feedback, Model};
 use tvse::io::scenario::Reach;
 use tvse::margins::Settings;
+use tvse::modal::spectrum::{Base, Spectrum};
 use tvse::modal::{Solver, identify};
 use tvse::structure::{self, Selection, Stick};
 use tvse::vehicle::Vehicle;
@@ -61,13 +62,14 @@ fn definition(vehicle: &Vehicle) -> Definition {
         modes: vec!["tvse".to_owned()],
         gimballed: vehicle.engines.iter().map(|e| e.group == "booster").collect(),
         exchange_ratio: 0.5,
+        solver: tvse::campaign::definition::Solver::Structured,
         sensitivity: None,
         margins: None,
     }
 }
 
 fn layers(criterion: &mut Criterion) {
-    for modes in [20, 60, 120] {
+    for modes in [20, 40, 58, 120] {
         let vehicle = vehicle(modes);
         let definition = definition(&vehicle);
         let dispersion =
@@ -107,6 +109,12 @@ fn layers(criterion: &mut Criterion) {
         group.bench_function(id("solve (all of it)"), |b| {
             b.iter(|| solver.poles(&model, &mut poles).expect("solved"));
         });
+        if let Some(base) = Base::proven(nominal, &mut solver) {
+            let mut spectrum = Spectrum::new(model.coordinates());
+            group.bench_function(id("certified spectrum"), |b| {
+                b.iter(|| spectrum.solve(&base, &model).expect("certified"));
+            });
+        }
         let mut scratch = Model::zeros(model.coordinates());
         group.bench_function(id("identify"), |b| {
             b.iter(|| {

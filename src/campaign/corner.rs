@@ -3,6 +3,7 @@
 //! Each side of each draw is one case with all else nominal; the search for the worst combination
 //! is not here.
 
+use super::definition::Solver;
 use super::evaluator::{self, Evaluator};
 use super::pool::{Pool, spans};
 use super::{Definition, Population, Record};
@@ -62,6 +63,8 @@ pub fn adverse_sides(
         modes: vec![definition.modes[mode].clone()],
         margins: None,
         sensitivity: None,
+        // Where both sides are equal rounding chooses; it is that of one solver, whatever the run's.
+        solver: Solver::Dense,
         ..definition.clone()
     };
     let sampler = Sampler::new(dispersion, definition.seed);

@@ -20,6 +20,30 @@ pub enum Slope {
     SingleGrid,
 }
 
+/// How the poles of cases are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Solver {
+    /// Every case by itself: mass matrix, balancing, QR iteration.
+    #[default]
+    Dense,
+    /// From the nominal poles by determinants, with a certificate; dense where there is none.
+    Structured,
+}
+
+impl Solver {
+    /// Both, in the order of declaration.
+    pub const ALL: [Self; 2] = [Self::Dense, Self::Structured];
+
+    /// The word in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Dense => "dense",
+            Self::Structured => "structured",
+        }
+    }
+}
+
 /// One way to evaluate a draw; all variants of a run share the draws, so that differences are paired.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Variant {
@@ -126,6 +150,9 @@ pub struct Definition {
     pub gimballed: Vec<bool>,
     /// Second-best to best overlap above which a case is followed by homotopy and both poles are stored.
     pub exchange_ratio: f64,
+    /// How poles are found; runs that do not say it are of a time when all were solved densely.
+    #[serde(default)]
+    pub solver: Solver,
     /// Where derivatives are stored, if anywhere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensitivity: Option<SensitivityRule>,

@@ -3,16 +3,19 @@
 //!
 //! It stores nothing and knows no files; `pool` runs it in parallel.
 
+use super::definition;
 use super::derivative::Place;
 use super::draw::Slots;
 use super::loops::{Loops, OpenLoop};
 use super::plant::Extent;
+use super::record::{Certificate, Solution};
 use super::{
     Branch, Definition, Evaluation, Failure, FailureKind, Pole, Population, Record, Variant,
 };
 use crate::dispersion::{Affine, Cursor, Dispersion, Draws, Sampler};
 use crate::dynamics::{DrawnVehicle, Effects, Model, Part, Plant};
 use crate::margins::Assessment;
+use crate::modal::spectrum::{Base, Spectrum};
 use crate::modal::{self, Reference, Solver, eigen, identify};
 use crate::vehicle::Vehicle;
 use nalgebra::Complex;
@@ -76,6 +79,8 @@ pub struct AtVariant {
     pub nominal: Model,
     /// Nominal pole of every mode of interest.
     pub references: Vec<Reference>,
+    /// Every nominal pole, from which those of cases are found.
+    base: Option<Base>,
     /// The flight control loops, where they are assessed.
     loops: Option<OpenLoop>,
 }
@@ -116,6 +121,9 @@ struct Buffers {
     model: Model,
     scratch: Model,
     solver: Solver,
+    spectrum: Spectrum,
+    /// Proven bounds of the poles, rad/s; none where they were solved densely.
+    bounds: Vec<f64>,
 }
 
 impl Buffers {
@@ -124,7 +132,8 @@ impl Buffers {
         let known = all.iter().position(|buffers| buffers.model.coordinates() == size);
         let index = known.unwrap_or_else(|| {
             let (model, scratch) = (Model::zeros(size), Model::zeros(size));
-            all.push(Self { model, scratch, solver: Solver::new(size) });
+            let (solver, spectrum) = (Solver::new(size), Spectrum::new(size));
+            all.push(Self { model, scratch, solver, spectrum, bounds: Vec::new() });
             all.len() - 1
         });
         &mut all[index]
@@ -223,12 +232,17 @@ impl<'a> Evaluator<'a> {
                 let sensitive =
                     sensitive.is_some_and(|rule| rule.covers(variant, flight_time, case));
                 let place = self.place(at, variant, draws, fixed, vehicle);
-                let outcome = drawn
-                    .clone()
-                    .and_then(|()| self.solve(at, &place, (variant, sensitive), buffers, poles));
+                let mut solution = None;
+                let outcome = drawn.clone().and_then(|()| {
+                    let (rows, found) =
+                        self.solve(at, &place, (variant, sensitive), buffers, poles)?;
+                    solution = Some(found);
+                    Ok(rows)
+                });
                 let null_poles = buffers.model.null_states.len();
+                let loops = None;
                 let mut evaluation =
-                    Evaluation { variant, flight_time, null_poles, outcome, loops: None };
+                    Evaluation { variant, flight_time, null_poles, solution, outcome, loops };
                 let model = &buffers.model;
                 look(&View { plant, drawn: vehicle, model, evaluation: &evaluation });
                 evaluation.loops = self.loops(at, variant, &drawn, vehicle, all_buffers, poles);
@@ -379,7 +393,7 @@ impl<'a> Evaluator<'a> {
         buffers: &mut Buffers,
         poles: &[Complex<f64>],
     ) -> Result<Vec<(Branch, modal::Candidate)>, Failure> {
-        let Buffers { model, scratch, solver } = buffers;
+        let Buffers { model, scratch, solver, .. } = buffers;
         let prepared = &at.variants[variant];
         let identity = identify::identify(
             solver,
@@ -413,11 +427,10 @@ impl<'a> Evaluator<'a> {
         (variant, sensitive): (usize, bool),
         buffers: &mut Buffers,
         poles: &mut Vec<Complex<f64>>,
-    ) -> Result<Vec<Pole>, Failure> {
+    ) -> Result<(Vec<Pole>, Solution), Failure> {
         let plant = place.plant;
         plant.assemble(place.drawn, place.effects, &mut buffers.model);
-        let solved = buffers.solver.poles(&buffers.model, poles);
-        solved.map_err(|error| Failure::from(&error))?;
+        let solution = find_poles(at.variants[variant].base.as_ref(), buffers, poles)?;
         let mut rows = Vec::new();
         for mode in 0..at.labels.len() {
             for (branch, found) in self.identify(at, variant, mode, buffers, poles)? {
@@ -434,14 +447,18 @@ impl<'a> Evaluator<'a> {
                 rows.push(row);
             }
         }
-        let Buffers { model, solver, .. } = buffers;
+        let Buffers { model, solver, bounds, .. } = buffers;
         if self.all_poles {
             let named: Vec<Complex<f64>> = rows.iter().map(|row: &Pole| row.value).collect();
             for &pole in poles.iter().filter(|pole| !named.contains(pole)) {
                 rows.push(other_pole(plant, &Reference::new(model, solver.pair(model, pole))));
             }
         }
-        Ok(rows)
+        for row in &mut rows {
+            let proven = poles.iter().zip(&*bounds).find(|(pole, _)| **pole == row.value);
+            row.error_bound = proven.map(|(_, bound)| *bound).or(row.error_bound);
+        }
+        Ok((rows, solution))
     }
 
     fn lost(&self, mode: usize, lost: identify::Lost) -> Failure {
@@ -453,6 +470,31 @@ impl<'a> Evaluator<'a> {
             ),
         }
     }
+}
+
+/// All poles of the model in `buffers`: by its base where there is one and they can be certified, else
+/// densely.
+fn find_poles(
+    base: Option<&Base>,
+    buffers: &mut Buffers,
+    poles: &mut Vec<Complex<f64>>,
+) -> Result<Solution, Failure> {
+    let Buffers { model, solver, spectrum, bounds, .. } = buffers;
+    bounds.clear();
+    let certified = base.map(|base| spectrum.solve(base, model));
+    let determinants = base.map_or(0, |_| spectrum.evaluations());
+    if let Some(Ok(certified)) = certified {
+        poles.clear();
+        poles.extend(certified.iter().map(|pole| pole.root));
+        bounds.extend(certified.iter().map(|pole| pole.bound));
+        let single = certified.iter().all(|pole| pole.multiplicity == 1);
+        let certificate = if single { Certificate::Discs } else { Certificate::Clusters };
+        let solver = definition::Solver::Structured;
+        return Ok(Solution { solver, certificate, determinants });
+    }
+    solver.poles(model, poles).map_err(|error| Failure::from(&error))?;
+    let (solver, certificate) = (definition::Solver::Dense, Certificate::Residual);
+    Ok(Solution { solver, certificate, determinants })
 }
 
 /// Poles asked for the second-order change of another: more than one, since of a symmetric vehicle the
@@ -489,6 +531,7 @@ fn named_pole(
         identity_confidence: Some(found.overlap.norm()),
         participation: Some(participation(plant, &found.reference)),
         residual: Some(pair.residual),
+        error_bound: Some(pair.bound).filter(|bound| bound.is_finite()),
         sensitivity: None,
     })
 }
@@ -512,6 +555,7 @@ fn other_pole(plant: &Plant, reference: &Reference) -> Pole {
         identity_confidence: None,
         participation: Some(participation(plant, reference)),
         residual: Some(reference.pair.residual),
+        error_bound: Some(reference.pair.bound).filter(|bound| bound.is_finite()),
         sensitivity: None,
     }
 }
@@ -567,6 +611,7 @@ fn at_time(
         .map(|(index, variant)| {
             let extent = Extent::of(variant);
             let plant = extents.iter().position(|e| *e == extent).unwrap_or_default();
+            let structured = definition.solver == definition::Solver::Structured;
             let mut prepared = at_variant(&plants[plant], plant, &nominal, variant, &labels)
                 .map_err(|(mode, lost)| Error::Lost {
                     mode: definition.modes[mode].clone(),
@@ -574,6 +619,10 @@ fn at_time(
                     variant: variant.name.clone(),
                     lost,
                 })?;
+            if structured {
+                let mut solver = Solver::new(prepared.nominal.coordinates());
+                prepared.base = Base::proven(&prepared.nominal, &mut solver);
+            }
             if definition.margins.as_ref().is_some_and(|plan| plan.holds(index)) {
                 let effects = prepared.effects;
                 prepared.loops = Some(OpenLoop::new(vehicle, set, definition, variant, effects)?);
@@ -614,5 +663,12 @@ fn at_variant(
     }
     let mut model = Model::zeros(size);
     plant.assemble(nominal, &effects, &mut model);
-    Ok(AtVariant { plant: plant_index, effects, nominal: model, references, loops: None })
+    Ok(AtVariant {
+        plant: plant_index,
+        effects,
+        nominal: model,
+        references,
+        base: None,
+        loops: None,
+    })
 }

@@ -290,6 +290,7 @@ mod tests {
             identity_confidence: None,
             participation: None,
             residual: None,
+            error_bound: None,
             sensitivity: None,
         }
     }
@@ -298,6 +299,7 @@ mod tests {
         let evaluations = evaluations
             .into_iter()
             .map(|(variant, flight_time, outcome)| Evaluation {
+                solution: None,
                 variant,
                 flight_time,
                 null_poles: 0,

@@ -1,5 +1,6 @@
 //! A campaign: cases evaluated in a parallel pool, their records and what they sum up to.
 
+pub mod audit;
 pub mod corner;
 pub mod definition;
 pub mod derivative;

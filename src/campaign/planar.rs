@@ -125,6 +125,7 @@ impl PlanarCampaign {
             modes: vec!["least_damped".to_owned()],
             gimballed: vec![true],
             exchange_ratio: 0.5,
+            solver: super::definition::Solver::Dense,
             sensitivity: None,
             margins: None,
         };
@@ -146,8 +147,14 @@ impl PlanarCampaign {
             scores.push(position.map(|position| position.score()));
         }
         let outcome = least_damped(parameters).map(|pole| vec![pole]);
-        let evaluation =
-            Evaluation { variant: 0, flight_time: 0, null_poles: 0, outcome, loops: None };
+        let evaluation = Evaluation {
+            variant: 0,
+            flight_time: 0,
+            null_poles: 0,
+            solution: None,
+            outcome,
+            loops: None,
+        };
         Record { population, case, values, scores, evaluations: vec![evaluation] }
     }
 }
@@ -170,6 +177,7 @@ fn least_damped(parameters: Parameters) -> Result<Pole, Failure> {
         identity_confidence: None,
         participation: None,
         residual: None,
+        error_bound: None,
         sensitivity: None,
     })
 }

@@ -140,9 +140,11 @@ impl Pool {
                     let sender = sender.clone();
                     scope.spawn(move |_| {
                         let mut records = Vec::new();
-                        if !abandoned.load(Ordering::Relaxed) {
-                            let case = |case| guarded(definition, block.population, case, evaluate);
-                            records.extend(block.cases.map(case));
+                        for case in block.cases {
+                            if abandoned.load(Ordering::Relaxed) || stop.load(Ordering::Relaxed) {
+                                break;
+                            }
+                            records.push(guarded(definition, block.population, case, evaluate));
                         }
                         // The receiver is gone only after an error, when nobody wants the block.
                         let _ = sender.send((index, records));
@@ -194,6 +196,7 @@ fn guarded(
             let plan = definition.margins.as_ref();
             (0..definition.variants.len()).map(move |variant| Evaluation {
                 null_poles: 0,
+                solution: None,
                 variant,
                 flight_time,
                 outcome: Err(failure.clone()),

@@ -2,6 +2,7 @@
 //!
 //! A record is a value; how it is stored is decided in `io`.
 
+use super::definition::Solver;
 use super::derivative::Sensitivity;
 use super::loops::Loops;
 use crate::dynamics::Part;
@@ -117,6 +118,9 @@ pub struct Pole {
     pub participation: Option<[f64; Part::ALL.len()]>,
     /// Relative residual of the eigenpair, −; `None` where no vector was computed.
     pub residual: Option<f64>,
+    /// Bound of the pole's error, rad/s: proven where the certificate says so, else to first order from the
+    /// residual; `None` where there is none.
+    pub error_bound: Option<f64>,
     /// Derivatives, where the run stores them.
     pub sensitivity: Option<Box<Sensitivity>>,
 }
@@ -148,6 +152,42 @@ pub fn damping_ratio(pole: Complex<f64>) -> f64 {
     -pole.re / pole.norm()
 }
 
+/// What proves the poles of an evaluation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Certificate {
+    /// Disjoint discs with one pole each, as many as there are poles.
+    Discs,
+    /// Disjoint discs, of which some hold several poles that cannot be told apart.
+    Clusters,
+    /// Dense solve: sums of poles against traces, residuals of the pairs.
+    Residual,
+}
+
+impl Certificate {
+    /// Every certificate, in the order of declaration.
+    pub const ALL: [Self; 3] = [Self::Discs, Self::Clusters, Self::Residual];
+
+    /// The word in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Discs => "discs",
+            Self::Clusters => "clusters",
+            Self::Residual => "residual",
+        }
+    }
+}
+
+/// How the poles of an evaluation were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Solution {
+    /// Solver that gave them.
+    pub solver: Solver,
+    /// What proves them.
+    pub certificate: Certificate,
+    /// Determinants evaluated, also where the dense solver answered in the end.
+    pub determinants: usize,
+}
+
 /// One evaluation of a case: one variant at one flight time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evaluation {
@@ -157,6 +197,8 @@ pub struct Evaluation {
     pub flight_time: usize,
     /// Number of poles at the origin known by construction, beside those solved for.
     pub null_poles: usize,
+    /// How the poles were found; `None` where they were not.
+    pub solution: Option<Solution>,
     /// The poles asked for, named modes first in the order of the run definition, or a failure.
     pub outcome: Result<Vec<Pole>, Failure>,
     /// The flight control loops, where they are assessed.

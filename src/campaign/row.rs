@@ -6,7 +6,7 @@ use super::definition::Definition;
 use super::loop_metric;
 use super::loops::{CurvePoint, Loops, NamedPeak};
 use super::metric::ReducedCase;
-use super::record::{Failure, Pole, Record};
+use super::record::{Failure, Pole, Record, Solution};
 use crate::margins::{AXES, AxisMargins};
 
 /// One row of the `cases` table.
@@ -41,6 +41,8 @@ pub struct ModeRow {
     pub flight_time: usize,
     /// Number of poles at the origin known by construction, beside those solved for.
     pub null_poles: usize,
+    /// How the poles of the evaluation were found; none where they were not.
+    pub solution: Option<Solution>,
     /// Index of the named mode; none for a pole that belongs to no named mode.
     pub mode: Option<usize>,
     /// The pole, or why there is none.
@@ -135,13 +137,14 @@ pub fn rows(definition: &Definition, record: Record) -> (CaseRow, Vec<ModeRow>) 
     let mut modes = Vec::new();
     for evaluation in record.evaluations {
         let (variant, flight_time) = (evaluation.variant, evaluation.flight_time);
-        let null_poles = evaluation.null_poles;
+        let (null_poles, solution) = (evaluation.null_poles, evaluation.solution);
         let row = |mode, outcome| ModeRow {
             population,
             case,
             variant,
             flight_time,
             null_poles,
+            solution,
             mode,
             outcome,
         };

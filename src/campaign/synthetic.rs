@@ -3,9 +3,11 @@
 //! No physics: the numbers only have to be unlike each other and to include failures, unstable
 //! poles and pairs of poles that exchange character.
 
-use super::definition::{Definition, Feedback, NozzleJet, Population, Slope, Variant};
+use super::definition::{Definition, Feedback, NozzleJet, Population, Slope, Solver, Variant};
 use super::outline::{DrawColumn, Input, Outline, StoredPoles};
-use super::record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};
+use super::record::{
+    Branch, Certificate, Evaluation, Failure, FailureKind, Pole, Record, Solution,
+};
 use crate::dispersion::Scheme;
 use nalgebra::Complex;
 
@@ -41,6 +43,7 @@ pub fn definition(cases: &[u64]) -> Definition {
         modes: vec!["tvse".to_owned(), "bending".to_owned()],
         gimballed: vec![true, true],
         exchange_ratio: 0.5,
+        solver: Solver::Structured,
         sensitivity: None,
         margins: None,
     }
@@ -97,6 +100,11 @@ pub fn evaluate(
                 variant,
                 flight_time,
                 null_poles: 0,
+                solution: outcome.is_ok().then_some(Solution {
+                    solver: Solver::Structured,
+                    certificate: Certificate::Discs,
+                    determinants: 32,
+                }),
                 outcome,
                 loops: None,
             });
@@ -132,6 +140,7 @@ fn poles(
             identity_confidence: mode.map(|_| random.next()),
             participation: Some(std::array::from_fn(|_| random.next())),
             residual: mode.map(|_| 1e-15 * random.next()),
+            error_bound: Some(1e-12),
             sensitivity: None,
         });
     };

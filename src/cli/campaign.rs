@@ -133,7 +133,7 @@ pub fn processors() -> usize {
 /// Says on the standard error what was mended as a run's folder was opened.
 pub fn say_mended(results: &Results) {
     for mended in &results.store().mended {
-        eprintln!("{mended}");
+        super::say(mended);
     }
 }
 
@@ -183,7 +183,7 @@ pub fn evaluate(
         Ok(_) => Ok(results),
         Err(problems) => {
             if kept > 0 {
-                eprintln!("{kept} cases are kept; {}", go_on());
+                super::say(format_args!("{kept} cases are kept; {}", go_on()));
             }
             Err(problems.into())
         }
@@ -262,7 +262,7 @@ pub fn finish(
         return end(&run, gates, &folder, out);
     }
     let cases = cases_of(&results.store().spans());
-    let kept = |_: &_| eprintln!("{cases} cases are kept; {}", go_on());
+    let kept = |_: &_| super::say(format_args!("{cases} cases are kept; {}", go_on()));
     let finished = results.finish(jobs, WORST).inspect_err(kept)?;
     let outline = finished.run.outline();
     write!(out, "{title}\n{}", story::story(outline, &finished.summary, &finished.worst))?;

@@ -48,23 +48,30 @@ pub struct Args {
 /// Coefficients that are no loop, loops that cannot be followed, and output that cannot be written.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let refuse = |key: &str, found: String| {
-        let allowed = "a proper ratio of finite coefficients whose closed loop can be followed";
+        let allowed = "a ratio of finite coefficients, strictly proper or with a direct term below 0.5, whose \
+                       closed loop can be followed";
         Problems::input("command line", key, found, allowed)
     };
     for (key, value) in
         [("--ellipse-gain", args.ellipse_gain), ("--ellipse-phase", args.ellipse_phase)]
     {
         if !(value > 0.0 && value.is_finite()) {
-            return Err(refuse(key, value.to_string()).into());
+            let allowed = "a finite number above 0";
+            return Err(Problems::input("command line", key, value.to_string(), allowed).into());
         }
     }
     let loops = Rational::new(&args.numerator, &args.denominator, args.delay)
-        .map_err(|error| refuse("--denominator", error.to_string()))?;
+        .map_err(|error| refuse("--numerator, --denominator, --delay", error.to_string()))?;
     let poles = loops.poles().map_err(|error| refuse("--denominator", error.to_string()))?;
+    let [lowest, highest] =
+        loops.frequencies_rad_s().map_err(|error| refuse("--numerator", error.to_string()))?;
+    let defaults = Settings::default();
     let settings = Settings {
+        lowest_hz: defaults.lowest_hz.min(lowest / TAU),
+        highest_hz: defaults.highest_hz.max(highest / TAU),
         gain_margin_db: args.ellipse_gain,
         phase_margin_deg: args.ellipse_phase,
-        ..Settings::default()
+        ..defaults
     };
     let zero = Complex::default();
     let g = |s| Matrix3::from_diagonal(&Vector3::new(loops.at(s), zero, zero));

@@ -2,7 +2,7 @@
 
 use super::{Error, INCOMPLETE, campaign};
 use crate::io::store::Store;
-use crate::io::{Results, maker};
+use crate::io::{Results, inputs, maker};
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -45,9 +45,12 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
             writeln!(out, "missing: {} cases {first} to {last}", name(span.population))?;
         }
         let cases: u64 = missing.iter().map(|span| span.cases.end - span.cases.start).sum();
-        eprintln!("{cases} cases are missing: evaluate them with the shards or --resume");
+        super::say(format_args!(
+            "{cases} cases are missing: evaluate them with the shards or --resume"
+        ));
         return Ok(INCOMPLETE);
     }
+    inputs::check(&args.run, &store.outline().inputs)?;
     let title = format!("merged on {}", maker::instruction_set());
     let gates = args.gates.as_deref().map(|gates| (gates, &args.outputs));
     campaign::finish(Results::of(store), 1, &title, gates, out)

@@ -184,11 +184,16 @@ pub fn run() -> ExitCode {
     let code = match result.and_then(|code| Ok(out.flush().map(|()| code)?)) {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("{error}");
+            say(&error);
             error.code()
         }
     };
     ExitCode::from(code)
+}
+
+/// Says a line on the standard error; that nobody can read it stops no campaign.
+fn say(line: impl std::fmt::Display) {
+    let _ = writeln!(std::io::stderr(), "{line}");
 }
 
 #[cfg(test)]

@@ -238,6 +238,9 @@ fn sweep(planar: &Planar, range: &str, out: &mut dyn Write) -> Result<(), Error>
     let from: f64 = from.trim().parse().map_err(|_| usage())?;
     let to: f64 = to.trim().parse().map_err(|_| usage())?;
     let count: u32 = count.trim().parse().map_err(|_| usage())?;
+    if !(from.is_finite() && to.is_finite() && count > 0) {
+        return Err(usage());
+    }
     write!(out, "thrust_n,stable")?;
     for i in 1..=4 {
         write!(out, ",pole_{i}_re_rad_s,pole_{i}_im_rad_s")?;

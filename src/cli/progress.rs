@@ -78,7 +78,7 @@ impl Shown {
         let told = self.told_of(progress);
         if self.show == Show::Json {
             let line = serde_json::to_string(&told).expect("text keys only");
-            eprintln!("{line}");
+            super::say(line);
         }
         Some(told)
     }

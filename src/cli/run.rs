@@ -1,14 +1,16 @@
 //! `tvse run`: the campaign.
 
-use super::Error;
 use super::campaign::{self, Campaign, Options};
 use super::interrupt::Interrupt;
-use crate::campaign::definition::MOST_CASES;
+use super::{Error, FAIL};
+use crate::campaign::audit;
+use crate::campaign::definition::{MOST_CASES, Solver};
 use crate::campaign::evaluator::Evaluator;
 use crate::campaign::{Outline, Pool, StoredPoles, corner, outline::DrawColumn};
 use crate::io::inputs::Inputs;
 use crate::io::{self, Results};
 use crate::problem::Problems;
+use crate::report;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -25,6 +27,7 @@ Examples:
   tvse run runs/reference.toml --cases 200 --output /tmp/quick --jobs 4
   tvse run runs/reference.toml --resume
   tvse run runs/reference.toml --extend 1000
+  tvse run runs/reference.toml --audit 20
   tvse run runs/reference.toml --shard 3/8")]
 pub struct Args {
     /// The run definition
@@ -47,6 +50,14 @@ pub struct Args {
     /// Poles stored in the `modes` table
     #[arg(long, value_enum, default_value_t = Poles::Named)]
     poles: Poles,
+    /// How poles are found: from the nominal ones with a certificate (dense where there is none), or every
+    /// case by a dense solve
+    #[arg(long, value_enum, default_value_t = SolverName::Structured)]
+    solver: SolverName,
+    /// Solve N cases, chosen by the seed, both ways before the run, and fail it where they disagree beyond
+    /// their bounds
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    audit: u64,
     #[command(flatten)]
     options: Options,
     #[command(flatten)]
@@ -60,6 +71,15 @@ enum Poles {
     Named,
     /// Every pole of every evaluation
     All,
+}
+
+/// How poles are found.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum SolverName {
+    /// From the nominal poles, certified
+    Structured,
+    /// Every case by itself
+    Dense,
 }
 
 /// Runs the command.
@@ -82,6 +102,10 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     if let Some(seed) = args.seed {
         definition.seed = seed;
     }
+    definition.solver = match args.solver {
+        SolverName::Structured => Solver::Structured,
+        SolverName::Dense => Solver::Dense,
+    };
     let (pool, jobs) = args.options.pool()?;
     let inputs = Inputs::of(&loaded)?;
     let interrupt = Interrupt::listen().map_err(|e| Error::Usage(format!("signals: {e}")))?;
@@ -100,6 +124,15 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let results = Results::open(&folder, outline, Some(&inputs), opening, access)?;
     let definition = results.store().outline().definition.clone();
     let sampler = loaded.sampler(&definition)?;
+    if args.audit > 0 {
+        let cases = audit::choose(&results.store().spans(), args.audit, definition.seed);
+        let audit = audit::audit(vehicle, &sampler, &definition, &cases)
+            .map_err(|error| unprepared(&args.run, &error))?;
+        write!(out, "{}", report::audit::text(&audit))?;
+        if !audit.disagreements.is_empty() {
+            return Ok(FAIL);
+        }
+    }
     let evaluator = Evaluator::new(vehicle, &sampler, &definition, poles == StoredPoles::All)
         .map_err(|error| unprepared(&args.run, &error))?;
     let gates = args.gates.as_deref().map(|gates| (gates, &args.outputs));

@@ -25,6 +25,10 @@ const PROBE: usize = 64 << 10;
 /// One problem if the file is missing, unreadable, not UTF-8 or larger than 64 MiB.
 pub fn read_text(path: &Path) -> Result<String, Problems> {
     let allowed = "a readable text file";
+    // Opening a pipe would wait for a writer.
+    if fs::metadata(path).is_ok_and(|about| !about.is_file() && !about.is_dir()) {
+        return Err(Problems::input(name(path), "", "no regular file", allowed));
+    }
     let file = File::open(path).map_err(|e| problem(path, &e, allowed))?;
     let bytes = file.metadata().map_err(|e| problem(path, &e, allowed))?.len();
     if bytes > LARGEST_TEXT {

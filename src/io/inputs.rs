@@ -102,8 +102,17 @@ pub fn copy(from: &Path, to: &Path) -> Result<(), Problems> {
 /// Reads what a run was made from: the copies in its folder, once all are found to be whole.
 ///
 /// # Errors
-/// Damage: every copy that is missing or has other bytes than `inputs` says.
+/// As [`check`].
 pub fn read(run_folder: &Path, inputs: &[Input]) -> Result<Loaded, Problems> {
+    check(run_folder, inputs)?;
+    scenario::load_copies(&run_folder.join(FOLDER))
+}
+
+/// Checks the copies of a run's inputs.
+///
+/// # Errors
+/// Damage: every copy that is missing or has other bytes than `inputs` says.
+pub fn check(run_folder: &Path, inputs: &[Input]) -> Result<(), Problems> {
     let folder = run_folder.join(FOLDER);
     let mut problems = Problems::default();
     for Input { name, blake3 } in inputs {
@@ -115,8 +124,7 @@ pub fn read(run_folder: &Path, inputs: &[Input]) -> Result<Loaded, Problems> {
         };
         problems.push(Kind::Damage, files::name(&path), "", found, format!("BLAKE3 {blake3}"));
     }
-    problems.into_result(())?;
-    scenario::load_copies(&folder)
+    problems.into_result(())
 }
 
 /// A path inside a folder, the same text on every system.

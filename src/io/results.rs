@@ -90,7 +90,9 @@ impl Results {
             Opening::Resume { cases } => Store::resume(folder, outline, cases, inputs, access)?,
             Opening::Extend(_) => {
                 Store::refuse_none(folder)?;
-                Store::resume(folder, outline, false, None, access)?
+                let store = Store::resume(folder, outline, false, None, access)?;
+                store.refuse_unfinished_extension()?;
+                store
             }
         };
         if let Opening::Extend(more) = opening {

@@ -6,11 +6,12 @@
 use super::column::Column;
 use crate::campaign::Population;
 use crate::campaign::Sensitivity;
+use crate::campaign::definition::Solver;
 use crate::campaign::loop_metric::loop_metrics;
 use crate::campaign::metric::metrics;
 use crate::campaign::nested::Statement;
 use crate::campaign::outline::{Outline, StoredPoles};
-use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
+use crate::campaign::record::{Branch, Certificate, Failure, FailureKind, Pole};
 use crate::campaign::row::{CaseRow, CurveRow, LoopRow, MarginRow, ModeRow, PeakRow};
 use crate::campaign::sample::Intervals;
 use crate::campaign::summary::{LEVELS, Spread, SummaryRow, WorstRow};
@@ -379,6 +380,31 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
     }
     columns.extend([
         number("residual", "1", "Relative residual of the eigenpair", |p| p.residual),
+        number(
+            "pole_error_bound_rad_s",
+            "rad/s",
+            "Bound of the distance of the pole from an exact one: proven by discs, to first order from the \
+             residual where the certificate is residual; NULL if there is none",
+            |p| p.error_bound,
+        ),
+        Column::word(
+            "solver",
+            "Solver that gave the poles of the evaluation; NULL if failed",
+            Solver::ALL.map(Solver::name),
+            |r: &ModeRow| Some(r.solution?.solver as usize),
+        ),
+        Column::word(
+            "certificate",
+            "What proves the poles of the evaluation: discs, one pole in each; clusters, discs of which some \
+             hold several poles; residual, a dense solve with its traces and residuals",
+            Certificate::ALL.map(Certificate::name),
+            |r: &ModeRow| Some(r.solution?.certificate as usize),
+        ),
+        Column::count(
+            "determinants",
+            "Effort: determinants evaluated for the evaluation; 0 where none was tried",
+            |r: &ModeRow| Some(r.solution?.determinants as i64),
+        ),
         Column::word("status", "ok, or the kind of failure", statuses(), |r: &ModeRow| {
             Some(status(r.outcome.as_ref().err()))
         }),

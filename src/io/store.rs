@@ -341,6 +341,21 @@ impl Store {
         }
     }
 
+    /// Refuses a run whose last extension is not finished: another would add to it.
+    ///
+    /// # Errors
+    /// An input problem with the number of cases that are missing.
+    pub fn refuse_unfinished_extension(&self) -> Result<(), Problems> {
+        let missing: u64 =
+            self.missing().iter().map(|span| span.cases.end - span.cases.start).sum();
+        if !self.extended || missing == 0 {
+            return Ok(());
+        }
+        let found = format!("an extension that is not finished, {missing} cases are missing");
+        let allowed = "--resume, which goes on with it; then a further --extend";
+        Err(Problems::input(files::name(&self.folder), "--extend", found, allowed))
+    }
+
     /// Adds `more` cases to every drawn population.
     ///
     /// # Errors

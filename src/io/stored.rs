@@ -5,7 +5,8 @@
 use super::run::Run;
 use super::schema::{self, TableName};
 use crate::campaign::Sensitivity;
-use crate::campaign::record::{Branch, Failure, FailureKind, Pole};
+use crate::campaign::definition::Solver;
+use crate::campaign::record::{Branch, Certificate, Failure, FailureKind, Pole, Solution};
 use crate::campaign::row::ModeRow;
 use crate::dynamics::Part;
 use crate::problem::Problems;
@@ -107,6 +108,9 @@ impl Run {
         let variant = words("variant", &variants)?;
         let mode = words("mode", &modes)?;
         let branch = words("branch", &schema::BRANCHES.map(Branch::name))?;
+        let solver = words("solver", &Solver::ALL.map(Solver::name))?;
+        let certificate = words("certificate", &Certificate::ALL.map(Certificate::name))?;
+        let determinants = column("determinants").as_primitive::<Int64Type>();
         let status = words("status", &schema::statuses().collect::<Vec<_>>())?;
         let case = column("case").as_primitive::<Int64Type>();
         let time = column("flight_time_s").as_primitive::<Float64Type>();
@@ -166,6 +170,7 @@ impl Run {
                         identity_confidence: number("identity_confidence", row),
                         participation: participation(row),
                         residual: number("residual", row),
+                        error_bound: number("pole_error_bound_rad_s", row),
                         sensitivity: sensitivity(row),
                     })
                 }
@@ -177,12 +182,19 @@ impl Run {
             };
             let case = case.value(row) as u64;
             let (mode, null_poles) = (mode[row], null_poles.value(row) as usize);
+            let solution =
+                solver[row].zip(certificate[row]).map(|(solver, certificate)| Solution {
+                    solver: Solver::ALL[solver],
+                    certificate: Certificate::ALL[certificate],
+                    determinants: determinants.value(row) as usize,
+                });
             rows.push(ModeRow {
                 population,
                 case,
                 variant,
                 flight_time,
                 null_poles,
+                solution,
                 mode,
                 outcome,
             });

@@ -26,6 +26,9 @@ pub enum Error {
     /// The numerator has the higher degree.
     #[error("the degree of the numerator must not exceed that of the denominator")]
     Improper,
+    /// The closed loop has a pole at zero.
+    #[error("the closed loop has a pole at zero: numerator and denominator add up to 0 there")]
+    ClosedAtZero,
     /// The roots of the denominator were not found.
     #[error("the roots of the denominator were not found")]
     NoConvergence,
@@ -70,6 +73,39 @@ impl Rational {
         if self.delay_s == 0.0 { ratio } else { ratio * (-s * self.delay_s).exp() }
     }
 
+    /// Frequencies between which everything happens, rad/s: a millionth of the smallest and a thousand times
+    /// the largest modulus of the poles and zeros of the loop, of those of `D + N` and `D − N`, and of 1/τ.
+    ///
+    /// # Errors
+    /// [`Error::NoConvergence`], and [`Error::ClosedAtZero`] for a closed loop with a pole at zero.
+    pub fn frequencies_rad_s(&self) -> Result<[f64; 2], Error> {
+        let mut whole = self.denominator.clone();
+        whole.resize(whole.len() + self.integrators as usize, 0.0);
+        let first = whole.len() - self.numerator.len();
+        let combined = |sign: f64| -> Vec<f64> {
+            let added = |i: usize| i.checked_sub(first).map_or(0.0, |at| sign * self.numerator[at]);
+            whole.iter().enumerate().map(|(i, d)| d + added(i)).collect()
+        };
+        let closed = combined(1.0);
+        if closed.last() == Some(&0.0) {
+            return Err(Error::ClosedAtZero);
+        }
+        let mut moduli = Vec::new();
+        for polynomial in [self.numerator.clone(), whole.clone(), closed, combined(-1.0)] {
+            // The roots of a polynomial are the poles of its inverse.
+            let leading = polynomial.iter().take_while(|value| **value == 0.0).count();
+            if leading < polynomial.len() {
+                let inverse = Self::new(&[], &polynomial[leading..], 0.0)?;
+                moduli.extend(inverse.poles()?.iter().map(|root| root.norm()));
+            }
+        }
+        moduli.extend((self.delay_s > 0.0).then(|| self.delay_s.recip()));
+        moduli.retain(|modulus| *modulus > 0.0 && modulus.is_finite());
+        let smallest = moduli.iter().copied().fold(f64::INFINITY, f64::min);
+        let largest = moduli.iter().copied().fold(0.0, f64::max);
+        Ok(if moduli.is_empty() { [1e-6, 1e3] } else { [1e-6 * smallest, 1e3 * largest] })
+    }
+
     /// The poles that are not zero, one of each complex pair: eigenvalues of the companion matrix.
     ///
     /// # Errors
@@ -90,6 +126,48 @@ impl Rational {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn margins_do_not_depend_on_the_unit_of_time() {
+        use crate::margins::{Settings, assess};
+        use nalgebra::{Matrix3, Vector3};
+        let found = |scale: f64| {
+            let scaled = |list: &[f64]| -> Vec<f64> {
+                let power = |i: usize| scale.powi(i as i32 + 1 - list.len() as i32);
+                list.iter().enumerate().map(|(i, c)| c * power(i)).collect()
+            };
+            let loops = Rational::new(&[25.0], &scaled(&[1.0, 10.0, 10.0, 10.0]), 0.01 / scale);
+            let loops = loops.unwrap();
+            let [lowest, highest] = loops.frequencies_rad_s().unwrap();
+            let settings = Settings {
+                lowest_hz: lowest / std::f64::consts::TAU,
+                highest_hz: highest / std::f64::consts::TAU,
+                ..Settings::default()
+            };
+            let zero = Complex::default();
+            let g = |s| Matrix3::from_diagonal(&Vector3::new(loops.at(s), zero, zero));
+            let margins = assess(g, &loops.poles().unwrap(), &[], &[], &settings).unwrap().axes[0];
+            [
+                margins.gain_high_db.value,
+                margins.phase_deg.value,
+                margins.disk.value,
+                margins.phase_deg.omega_rad_s.unwrap() / scale,
+            ]
+        };
+        let here = found(1.0);
+        assert!(here[0] > 0.0 && here[0] < 40.0, "{here:?}");
+        for scale in [1e-8, 1e8] {
+            for (here, there) in here.iter().zip(found(scale)) {
+                assert!((here - there).abs() < 1e-6 * here, "{here} {there} at {scale}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_closed_loop_with_a_pole_at_zero_is_refused() {
+        let loops = Rational::new(&[-1.0], &[1.0, 1.0], 0.0).unwrap();
+        assert_eq!(loops.frequencies_rad_s(), Err(Error::ClosedAtZero));
+    }
 
     #[test]
     fn a_ratio_is_evaluated_with_its_delay_and_poles_at_zero() {

@@ -62,6 +62,8 @@ pub struct Pair {
     /// Root of the sum of squares of ‖L x‖ and ‖yᴴ L‖ over ‖M‖|s|² + ‖D‖|s| + ‖K‖ (Frobenius norms), −,
     /// in coordinates scaled so that the diagonal is near one.
     pub residual: f64,
+    /// Distance of the pole from an exact one to first order, ‖L x‖ ‖y‖/|yᴴ L' x| in those coordinates, rad/s.
+    pub bound: f64,
 }
 
 /// Buffers of the solver for models of one size.
@@ -366,14 +368,14 @@ impl Solver {
                 }
             }
         }
-        let residual = self.residual(model, pole);
+        let (residual, bound) = self.residual(model, pole);
         let unscaled = |column: usize| {
             let vector: Vec<c64> =
                 (0..n).map(|row| self.vectors[(row, column)] * self.scale[row]).collect();
             let norm = norm(&vector);
             vector.into_iter().map(|z| z / norm).collect()
         };
-        Pair { pole, right: unscaled(0), left: unscaled(1), residual }
+        Pair { pole, right: unscaled(0), left: unscaled(1), residual, bound }
     }
 
     /// Fills the pencil with `S L(s) S`, where the powers of two S bring the diagonal of
@@ -398,14 +400,15 @@ impl Solver {
         }
     }
 
-    /// Relative residual of the vectors found, see [`Pair::residual`].
-    fn residual(&self, model: &Model, s: c64) -> f64 {
+    /// Relative residual of the vectors found and the bound of the pole, see [`Pair`].
+    fn residual(&self, model: &Model, s: c64) -> (f64, f64) {
         let n = model.coordinates();
         let (right, left) = (self.vectors.col(0), self.vectors.col(1));
         let (square, modulus) = (s * s, s.norm());
         let mut rows = vec![c64::new(0.0, 0.0); n];
         let mut columns = rows.clone();
         let mut sums = [0.0_f64; 3];
+        let mut derivative = c64::new(0.0, 0.0);
         for (column, to_column) in columns.iter_mut().enumerate() {
             for (row, to_row) in rows.iter_mut().enumerate() {
                 let (at, scale) = ((row, column), self.scale[row] * self.scale[column]);
@@ -413,13 +416,17 @@ impl Solver {
                 let entry = (square * m + s * d + k) * scale;
                 *to_row += entry * right[column];
                 *to_column += left[row].conj() * entry;
+                derivative += left[row].conj() * right[column] * ((2.0 * s * m + d) * scale);
                 for (sum, value) in sums.iter_mut().zip([m, d, k]) {
                     *sum += (value * scale).powi(2);
                 }
             }
         }
         let [m, d, k] = sums.map(f64::sqrt);
-        norm(&rows).hypot(norm(&columns)) / (m * modulus * modulus + d * modulus + k)
+        let size = m * modulus * modulus + d * modulus + k;
+        // Both vectors have unit norm; rounding of L x itself is no less than ε of its size.
+        let bound = (norm(&rows) + n as f64 * f64::EPSILON * size) / derivative.norm();
+        (norm(&rows).hypot(norm(&columns)) / size, bound)
     }
 }
 

@@ -197,7 +197,7 @@ fn candidates(
 ///
 /// `path(t)` fills a model for t in (0, 1]; a step is accepted when one pole keeps at least
 /// `STEP_OVERLAP`, else it is halved, down to `LEAST_STEP`, where the best is taken: a mode
-/// crosses others by its vectors, not by its frequency.
+/// crosses others by its vectors, not by its frequency. `at_end` are the poles at t = 1, where they are known.
 ///
 /// # Errors
 /// [`Lost`] where a solve fails or no pole overlaps.
@@ -205,6 +205,7 @@ pub fn follow(
     solver: &mut Solver,
     mut reference: Reference,
     model: &mut Model,
+    at_end: Option<&[c64]>,
     mut path: impl FnMut(f64, &mut Model),
 ) -> Result<Reference, Lost> {
     let (mut done, mut step) = (0.0_f64, 1.0_f64);
@@ -212,7 +213,10 @@ pub fn follow(
     while done < 1.0 {
         let next = (done + step).min(1.0);
         path(next, model);
-        solver.poles(model, &mut poles)?;
+        match at_end.filter(|_| next == 1.0) {
+            Some(known) => known.clone_into(&mut poles),
+            None => solver.poles(model, &mut poles)?,
+        }
         let found = candidates(solver, model, &poles, &reference).into_iter().next();
         let best = found.ok_or(Lost::Overlap { best: 0.0, least: LEAST_OVERLAP })?;
         let overlap = best.overlap.norm();
@@ -257,7 +261,9 @@ pub fn identify(
     let Some(rival) = rival else {
         return Ok(Identity { primary: best, partner: None });
     };
-    let end = follow(solver, reference.clone(), scratch, |t, model| model.blend(nominal, case, t))?;
+    let start = reference.clone();
+    let blend = |t: f64, model: &mut Model| model.blend(nominal, case, t);
+    let end = follow(solver, start, scratch, Some(poles), blend)?;
     // The path ends in the case itself, so that its last pole is one of the case's, bit for bit.
     let at_end = |candidate: &Candidate| candidate.reference.pair.pole == end.pair.pole;
     if at_end(&best) {
@@ -306,12 +312,12 @@ pub fn nominal(
     let pole = c64::new(-damping / 2.0, 0.0) + root;
     let mut unit = vec![c64::new(0.0, 0.0); size];
     unit[coordinate] = c64::new(1.0, 0.0);
-    let pair = Pair { pole, right: unit.clone(), left: unit, residual: 0.0 };
+    let pair = Pair { pole, right: unit.clone(), left: unit, residual: 0.0, bound: 0.0 };
     let start = Reference::new(&uncoupled, pair);
     let mut scratch = Model::zeros(size);
     let with_mass =
-        follow(solver, start, &mut scratch, |t, model| model.blend(&uncoupled, &coupled, t))?;
-    follow(solver, with_mass, &mut scratch, |t, model| model_at(t, model))
+        follow(solver, start, &mut scratch, None, |t, model| model.blend(&uncoupled, &coupled, t))?;
+    follow(solver, with_mass, &mut scratch, None, |t, model| model_at(t, model))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ pub mod eigen;
 pub mod identify;
 pub mod realisation;
 pub mod response;
+pub mod spectrum;
 
 pub use eigen::{Pair, Solver};
 pub use identify::{Candidate, Identity, Reference};

@@ -2,6 +2,7 @@
 
 pub mod actuator;
 pub mod annotations;
+pub mod audit;
 pub mod chart;
 pub mod feedback;
 pub mod figure;

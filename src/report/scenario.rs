@@ -4,6 +4,7 @@
 
 use crate::campaign::{Definition, NozzleJet, Slope, Variant};
 use crate::dispersion::Dispersion;
+use crate::dynamics::Feedback;
 use crate::vehicle::Vehicle;
 use std::fmt::Write;
 
@@ -89,6 +90,18 @@ fn effects(variant: &Variant) -> String {
             Slope::VirtualGrid => "virtual grid",
             Slope::SingleGrid => "single grid",
         }),
+        variant.rigid_body.then_some("rigid body"),
+        variant.slosh.then_some("slosh"),
+        variant.aerodynamics.then_some("aerodynamics"),
+        match variant.feedback {
+            Feedback::Open => None,
+            Feedback::Closed => Some("autopilot closed"),
+            Feedback::Inverted => Some("autopilot inverted"),
+        },
     ];
-    parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    let mut text = parts.into_iter().flatten().collect::<Vec<_>>().join(", ");
+    if let Some(set) = &variant.actuators {
+        text += &format!(", {set} actuators");
+    }
+    text
 }

@@ -142,13 +142,33 @@ fn transfer_function(
             Err(())
         }
     };
-    Some(Law::TransferFunction(TransferActuator {
-        command: command.ok()?,
-        stiffness: stiffness.ok()?,
-        damping_n_m_s_rad: file.damping_n_m_s_rad,
-        gain: 1.0,
-        time_scale: 1.0,
-    }))
+    let (command, stiffness) = (command.ok()?, stiffness.ok()?);
+    let stable = held(&format!("{key}.denominator"), &stiffness.state_space(), findings)
+        & command.as_ref().is_none_or(|command| {
+            held(&format!("{key}.command_denominator"), &command.state_space(), findings)
+        });
+    stable.then(|| ()).map(|()| {
+        Law::TransferFunction(TransferActuator {
+            command,
+            stiffness,
+            damping_n_m_s_rad: file.damping_n_m_s_rad,
+            gain: 1.0,
+            time_scale: 1.0,
+        })
+    })
+}
+
+/// Whether an actuator is stable with its nozzle held: poles left of the imaginary axis, or at zero.
+fn held(key: &str, system: &StateSpace, findings: &mut Findings) -> bool {
+    let poles = system.poles();
+    let unstable = poles.iter().flatten().find(|pole| pole.norm() != 0.0 && !(pole.re < 0.0));
+    let found = match (&poles, unstable) {
+        (None, _) => "poles that cannot be found".to_owned(),
+        (_, Some(pole)) => format!("a pole at {pole} rad/s"),
+        _ => return true,
+    };
+    findings.push(key, found, "poles in the open left half plane or at zero, the nozzle held");
+    false
 }
 
 fn state_space(key: &str, file: &StateSpaceFile, findings: &mut Findings) -> Option<Law> {

@@ -250,6 +250,16 @@ fn allocation(
             findings.push(format!("autopilot.allocation.gimbals[{i}]"), found, allowed);
             good = false;
         }
+        let before = &file.gimbals[..i];
+        let twice = all.iter().find(|(_, name)| {
+            pattern::matches(entry, name)
+                && before.iter().any(|other| pattern::matches(other, name))
+        });
+        if let Some((_, name)) = twice {
+            let found = format!("\"{entry}\", which names {name} again");
+            findings.push(format!("autopilot.allocation.gimbals[{i}]"), found, "each gimbal once");
+            good = false;
+        }
     }
     let chosen = |name: &str| file.gimbals.iter().any(|entry| pattern::matches(entry, name));
     let gimbals: Vec<(usize, usize)> =

@@ -110,7 +110,7 @@ pub enum FilterFile {
         /// Name inside its path (default: its number, from 1).
         name: Option<String>,
         /// Corner, Hz.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(extend("minimum" = 1e-6, "maximum" = 1e6))]
         frequency_hz: f64,
     },
     /// Lead-lag (1 + s/ω_z)/(1 + s/ω_p).
@@ -118,10 +118,10 @@ pub enum FilterFile {
         /// Name inside its path (default: its number, from 1).
         name: Option<String>,
         /// Zero, Hz.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(extend("minimum" = 1e-6, "maximum" = 1e6))]
         zero_hz: f64,
         /// Pole, Hz.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(extend("minimum" = 1e-6, "maximum" = 1e6))]
         pole_hz: f64,
     },
     /// Notch (s² + 2ζ_z ω s + ω²)/(s² + 2ζ_p ω s + ω²).
@@ -129,7 +129,7 @@ pub enum FilterFile {
         /// Name inside its path (default: its number, from 1).
         name: Option<String>,
         /// Frequency, Hz.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(extend("minimum" = 1e-6, "maximum" = 1e6))]
         frequency_hz: f64,
         /// Damping ratio of the zeros.
         zero_damping: f64,
@@ -142,12 +142,12 @@ pub enum FilterFile {
         /// Name inside its path (default: its number, from 1).
         name: Option<String>,
         /// Frequency of the zeros, Hz.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(extend("minimum" = 1e-6, "maximum" = 1e6))]
         zero_hz: f64,
         /// Damping ratio of the zeros.
         zero_damping: f64,
         /// Frequency of the poles, Hz.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(extend("minimum" = 1e-6, "maximum" = 1e6))]
         pole_hz: f64,
         /// Damping ratio of the poles.
         #[schemars(extend("exclusiveMinimum" = 0.0))]
@@ -158,7 +158,7 @@ pub enum FilterFile {
         /// Name inside its path (default: its number, from 1).
         name: Option<String>,
         /// Frequency, Hz.
-        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[schemars(extend("minimum" = 1e-6, "maximum" = 1e6))]
         frequency_hz: f64,
         /// Damping ratio.
         #[schemars(extend("exclusiveMinimum" = 0.0))]

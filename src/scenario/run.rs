@@ -9,7 +9,7 @@ use super::run_file::{
 use super::table::Findings;
 use super::vehicle::Resolved;
 use super::{fixed, names, pattern, plan};
-use crate::campaign::definition::Feedback;
+use crate::campaign::definition::{Feedback, Solver};
 use crate::campaign::{Definition, LoopPlan, NozzleJet, Population, Slope, Variant};
 use crate::dispersion::{Dispersion, Draw, Listed, Scheme};
 use crate::margins::Settings;
@@ -130,6 +130,7 @@ pub fn resolve(
             modes: file.modes.clone(),
             gimballed,
             exchange_ratio: file.identity.exchange_ratio,
+            solver: Solver::Structured,
             sensitivity,
             margins,
         },

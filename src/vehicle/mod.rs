@@ -75,7 +75,9 @@ impl Vehicle {
         for engine in &self.engines {
             force += engine.thrust_direction * engine.motor.thrust_at(time_s);
             if !engine.in_modes {
-                mass += engine.nozzle.mass_kg;
+                let factor = engine.nozzle.ablation.map_or(0.0, |ablation| ablation.factor);
+                let share = factor * engine.motor.burned_fraction_at(time_s);
+                mass += engine.nozzle.ablated(share).mass_kg;
             }
         }
         mass += (self.tanks.iter().filter(|tank| !tank.in_modes))

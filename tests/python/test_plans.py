@@ -378,6 +378,28 @@ def test_indices_of_designs_have_students_intervals_over_replicates_or_none(runs
             assert row["intervals"] == "replicates"
 
 
+def test_influences_are_means_of_stored_derivatives_and_agree_with_regression(runs, folder):
+    """Student's intervals of scipy; shares within 0.08 of squared coefficients of 300 cases (four deviations)."""
+    run = runs("small_derivatives", scenario("small", 300, 'kind = "monte_carlo"') + "\n[sensitivity]\n")
+    rows = lines("influence", run.folder, "--variant", "jet_damping", "-o", folder / "i.csv")
+    modes = run.table("modes").query("population == 'dispersed' and variant == 'jet_damping' and branch == 'primary'")
+    regression = lines("sensitivity", run.folder, "--metric", METRIC, "-o", folder / "i2.csv")
+    variance = modes.damping_ratio.var(ddof=1)
+    for key in KEYS:
+        row = next(r for r in rows if r["key"] == key)
+        by = modes["ddr_" + run.columns[key].removeprefix("draw_")].to_numpy()
+        low, high = scipy.stats.ttest_1samp(by, 0).confidence_interval(0.95)
+        found = [float(row[name]) for name in ("mean", "mean_low", "mean_high", "mean_modulus")]
+        assert found == pytest.approx([by.mean(), low, high, np.abs(by).mean()], rel=1e-9, abs=1e-15)
+        assert float(row["share_linear"]) == pytest.approx(by.mean() ** 2 / variance, rel=1e-9, abs=1e-15)
+        src = float(next(r for r in regression if r["key"] == key)["src"])
+        assert float(row["share_linear"]) == pytest.approx(src**2, abs=0.08)
+        assert float(row["total_index_bound"]) >= float(row["share_linear"])
+        # The bars of the tornado chart lie on the sides that the derivative says.
+        swing = float(row["damping_ratio_at_high"]) - float(row["damping_ratio_at_low"])
+        assert np.sign(swing) == np.sign(by.mean())
+
+
 def test_crossed_indices_are_the_estimators_and_agree_with_openturns(runs, folder):
     run = runs("small_saltelli", scenario("small", None, 'kind = "saltelli"\nrows = 120'))
     rows = lines("sensitivity", run.folder, "--metric", METRIC, "-o", folder / "c.csv")

@@ -419,6 +419,46 @@ fn on_a_small_vehicle_the_search_equals_an_exhaustive_grid_and_the_planted_corne
 }
 
 #[test]
+fn a_search_follows_its_mode_across_others_and_through_a_veering() {
+    let loaded = loaded();
+    let vehicle = &loaded.vehicle.vehicle;
+    // The TVSE mode from 0.43 to 1.57 of its frequency: two symmetric modes below the nominal and one above
+    // are crossed, at the upper end it veers away from an antisymmetric one.
+    let text = row("modes.m006.frequency", "mode", "").replace("sigma = 0.01", "sigma = 0.19")
+        + &row("booster.*.nozzle.cg", "vehicle", "").replace("sigma = 0.01", "sigma = 0.03");
+    let dispersion = dispersion::read("test", &text, vehicle).unwrap();
+    let elastic = variants(&loaded).swap_remove(0);
+    let definition = at_105(&loaded, vec![elastic]);
+    let sampler = Sampler::new(&dispersion, 1);
+    let evaluator = Evaluator::new(vehicle, &sampler, &definition, false).unwrap();
+    let aim = Aim { variant: 0, baseline: None, mode: 0, quantity: Quantity::DampingRatio };
+    let starts = [-2.9, -1.5, 1.5, 2.9].map(|z| (0, vec![Some(z), Some(0.0)])).to_vec();
+    let plan = worst::Plan {
+        aim,
+        flight_times: vec![0],
+        box_sigma: 3.0,
+        radius_sigma: 3.0,
+        corner_keys: 2,
+        starts,
+    };
+    let go = AtomicBool::new(false);
+    let (cases, work) = worst::search(&evaluator, &dispersion, &definition, &plan, &go).unwrap();
+    assert!(work.descents >= 10, "{work:?}");
+    let objective =
+        Objective { evaluator: &evaluator, dispersion: &dispersion, aim, flight_time: 0 };
+    let score = |i: usize, steps: usize| -3.0 + 6.0 * i as f64 / steps as f64;
+    let grid = (0..=120).flat_map(|i| (0..=4).map(move |j| [score(i, 120), score(j, 4)]));
+    let values = grid.filter_map(|z| objective.value(&z.map(Some)).ok());
+    let least = values.fold(f64::INFINITY, f64::min);
+    let found = cases.iter().find(|case| case.method == Method::Box).unwrap();
+    assert!(found.objective <= least + 1e-7, "{} {least}", found.objective);
+    // What was followed is what the campaign's own rule finds there.
+    for case in &cases {
+        assert_eq!(objective.value(&case.scores).unwrap(), case.objective, "{case:?}");
+    }
+}
+
+#[test]
 fn the_search_of_the_damping_that_feedback_adds_is_no_worse_than_a_grid() {
     let loaded = loaded();
     let vehicle = &loaded.vehicle.vehicle;

@@ -10,6 +10,7 @@ mod commands;
 mod corpus;
 mod damage;
 mod derivatives;
+mod examples;
 mod failures;
 mod gates;
 mod import;

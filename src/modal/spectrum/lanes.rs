@@ -1,0 +1,387 @@
+//! Eight numbers at a time: the one file that knows instruction sets.
+//!
+//! Kernels are written once over [`Vector`] and compiled for AVX-512, AVX2 with FMA and portable code; which one
+//! runs is found out when the program runs. Lanes never mix, so that AVX-512 and AVX2 give the same
+//! bits; the portable form rounds products that the others do not, and agrees within the error bounds.
+
+/// Number of lanes.
+pub const WIDTH: usize = 8;
+
+/// Eight complex numbers as they lie in memory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(C, align(64))]
+pub struct Complexes {
+    /// Real parts.
+    pub re: [f64; WIDTH],
+    /// Imaginary parts.
+    pub im: [f64; WIDTH],
+}
+
+impl Complexes {
+    /// Zeros.
+    pub const ZERO: Self = Self { re: [0.0; WIDTH], im: [0.0; WIDTH] };
+}
+
+/// Eight real numbers in registers.
+pub trait Vector: Copy {
+    /// From memory.
+    fn load(from: &[f64; WIDTH]) -> Self;
+    /// To memory.
+    fn store(self, to: &mut [f64; WIDTH]);
+    /// One number in every lane.
+    fn splat(value: f64) -> Self;
+    /// Sum.
+    fn add(self, other: Self) -> Self;
+    /// Difference.
+    fn sub(self, other: Self) -> Self;
+    /// Product.
+    fn mul(self, other: Self) -> Self;
+    /// Quotient.
+    fn div(self, other: Self) -> Self;
+    /// `self · a + b`.
+    fn mul_add(self, a: Self, b: Self) -> Self;
+    /// `b − self · a`.
+    fn negative_mul_add(self, a: Self, b: Self) -> Self;
+    /// Greater of two; the other where one is NaN.
+    fn max(self, other: Self) -> Self;
+    /// Square root.
+    fn sqrt(self) -> Self;
+}
+
+/// Complex numbers in registers.
+#[derive(Clone, Copy)]
+pub struct Complex<V> {
+    /// Real parts.
+    pub re: V,
+    /// Imaginary parts.
+    pub im: V,
+}
+
+#[expect(clippy::should_implement_trait, reason = "the names of `Vector`, all inlined")]
+impl<V: Vector> Complex<V> {
+    /// From memory.
+    #[inline(always)]
+    pub fn load(from: &Complexes) -> Self {
+        Self { re: V::load(&from.re), im: V::load(&from.im) }
+    }
+
+    /// To memory.
+    #[inline(always)]
+    pub fn store(self, to: &mut Complexes) {
+        self.re.store(&mut to.re);
+        self.im.store(&mut to.im);
+    }
+
+    /// One number in every lane.
+    #[inline(always)]
+    pub fn splat(re: f64, im: f64) -> Self {
+        Self { re: V::splat(re), im: V::splat(im) }
+    }
+
+    /// Sum.
+    #[inline(always)]
+    pub fn add(self, other: Self) -> Self {
+        Self { re: self.re.add(other.re), im: self.im.add(other.im) }
+    }
+
+    /// Difference.
+    #[inline(always)]
+    pub fn sub(self, other: Self) -> Self {
+        Self { re: self.re.sub(other.re), im: self.im.sub(other.im) }
+    }
+
+    /// Product.
+    #[inline(always)]
+    pub fn mul(self, other: Self) -> Self {
+        Self {
+            re: self.im.negative_mul_add(other.im, self.re.mul(other.re)),
+            im: self.im.mul_add(other.re, self.re.mul(other.im)),
+        }
+    }
+
+    /// `self − a · b`.
+    #[inline(always)]
+    pub fn subtract_product(self, a: Self, b: Self) -> Self {
+        Self {
+            re: a.im.mul_add(b.im, a.re.negative_mul_add(b.re, self.re)),
+            im: a.im.negative_mul_add(b.re, a.re.negative_mul_add(b.im, self.im)),
+        }
+    }
+
+    /// `self + a · b` with real `a`.
+    #[inline(always)]
+    pub fn add_real_product(self, a: V, b: Self) -> Self {
+        Self { re: a.mul_add(b.re, self.re), im: a.mul_add(b.im, self.im) }
+    }
+
+    /// Product with a real number.
+    #[inline(always)]
+    pub fn scale(self, factor: V) -> Self {
+        Self { re: self.re.mul(factor), im: self.im.mul(factor) }
+    }
+
+    /// Square of the modulus.
+    #[inline(always)]
+    pub fn square(self) -> V {
+        self.im.mul_add(self.im, self.re.mul(self.re))
+    }
+
+    /// Reciprocal.
+    #[inline(always)]
+    pub fn reciprocal(self) -> Self {
+        let factor = V::splat(1.0).div(self.square());
+        Self { re: self.re.mul(factor), im: V::splat(0.0).sub(self.im.mul(factor)) }
+    }
+}
+
+/// Portable lanes: plain arrays, products and sums each rounded.
+#[derive(Clone, Copy)]
+pub struct Portable([f64; WIDTH]);
+
+impl Portable {
+    #[inline(always)]
+    fn with(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        Self(std::array::from_fn(|lane| f(self.0[lane], other.0[lane])))
+    }
+}
+
+impl Vector for Portable {
+    #[inline(always)]
+    fn load(from: &[f64; WIDTH]) -> Self {
+        Self(*from)
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f64; WIDTH]) {
+        *to = self.0;
+    }
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self([value; WIDTH])
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.with(other, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.with(other, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.with(other, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.with(other, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        self.mul(a).add(b)
+    }
+    #[inline(always)]
+    fn negative_mul_add(self, a: Self, b: Self) -> Self {
+        b.sub(self.mul(a))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.with(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.with(self, |a, _| a.sqrt())
+    }
+}
+
+/// An instruction set that this machine has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    /// Plain Rust.
+    Portable,
+    /// AVX2 and FMA.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Found),
+    /// AVX-512 F.
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Found),
+}
+
+/// Proof that an instruction set was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Found(());
+
+impl Level {
+    /// Every level of this machine, the fastest first.
+    pub fn all() -> Vec<Self> {
+        let mut levels = Vec::new();
+        #[cfg(target_arch = "x86_64")]
+        {
+            let avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+            if avx2 && is_x86_feature_detected!("avx512f") {
+                levels.push(Self::Avx512(Found(())));
+            }
+            if avx2 {
+                levels.push(Self::Avx2(Found(())));
+            }
+        }
+        levels.push(Self::Portable);
+        levels
+    }
+
+    /// The fastest level of this machine.
+    pub fn best() -> Self {
+        Self::all()[0]
+    }
+}
+
+/// Work that is done in lanes.
+pub trait Kernel {
+    /// What comes out.
+    type Output;
+    /// The work; implementations are `#[inline(always)]`.
+    fn run<V: Vector>(self) -> Self::Output;
+}
+
+impl Level {
+    /// Runs a kernel compiled for this level.
+    #[inline]
+    pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        match self {
+            Self::Portable => kernel.run::<Portable>(),
+            // SAFETY: `Found` is made only where the processor was asked for the features.
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => unsafe { x86::avx2(kernel) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => unsafe { x86::avx512(kernel) },
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::{Kernel, Vector, WIDTH};
+    use std::arch::x86_64::*;
+
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[target_feature(enable = "avx2,fma")]
+    pub unsafe fn avx2<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Avx2>()
+    }
+
+    /// # Safety
+    /// The processor has AVX-512 F, AVX2 and FMA.
+    #[target_feature(enable = "avx512f,avx2,fma")]
+    pub unsafe fn avx512<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Avx512>()
+    }
+
+    /// Two registers of four; made only inside [`avx2`].
+    #[derive(Clone, Copy)]
+    pub struct Avx2(__m256d, __m256d);
+
+    /// One register of eight; made only inside [`avx512`].
+    #[derive(Clone, Copy)]
+    pub struct Avx512(__m512d);
+
+    // SAFETY of what follows: values of these types are made only by kernels that run inside the two
+    // functions above, whose processor has the instructions. Loads and stores are unaligned ones within an array of
+    // eight.
+    impl Vector for Avx2 {
+        #[inline(always)]
+        fn load(from: &[f64; WIDTH]) -> Self {
+            unsafe { Self(_mm256_loadu_pd(from.as_ptr()), _mm256_loadu_pd(from[4..].as_ptr())) }
+        }
+        #[inline(always)]
+        fn store(self, to: &mut [f64; WIDTH]) {
+            let (low, high) = to.split_at_mut(4);
+            unsafe {
+                _mm256_storeu_pd(low.as_mut_ptr(), self.0);
+                _mm256_storeu_pd(high.as_mut_ptr(), self.1);
+            }
+        }
+        #[inline(always)]
+        fn splat(value: f64) -> Self {
+            unsafe { Self(_mm256_set1_pd(value), _mm256_set1_pd(value)) }
+        }
+        #[inline(always)]
+        fn add(self, other: Self) -> Self {
+            unsafe { Self(_mm256_add_pd(self.0, other.0), _mm256_add_pd(self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn sub(self, other: Self) -> Self {
+            unsafe { Self(_mm256_sub_pd(self.0, other.0), _mm256_sub_pd(self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn mul(self, other: Self) -> Self {
+            unsafe { Self(_mm256_mul_pd(self.0, other.0), _mm256_mul_pd(self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn div(self, other: Self) -> Self {
+            unsafe { Self(_mm256_div_pd(self.0, other.0), _mm256_div_pd(self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn mul_add(self, a: Self, b: Self) -> Self {
+            unsafe { Self(_mm256_fmadd_pd(self.0, a.0, b.0), _mm256_fmadd_pd(self.1, a.1, b.1)) }
+        }
+        #[inline(always)]
+        fn negative_mul_add(self, a: Self, b: Self) -> Self {
+            unsafe { Self(_mm256_fnmadd_pd(self.0, a.0, b.0), _mm256_fnmadd_pd(self.1, a.1, b.1)) }
+        }
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            unsafe { Self(_mm256_max_pd(self.0, other.0), _mm256_max_pd(self.1, other.1)) }
+        }
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            unsafe { Self(_mm256_sqrt_pd(self.0), _mm256_sqrt_pd(self.1)) }
+        }
+    }
+
+    impl Vector for Avx512 {
+        #[inline(always)]
+        fn load(from: &[f64; WIDTH]) -> Self {
+            unsafe { Self(_mm512_loadu_pd(from.as_ptr())) }
+        }
+        #[inline(always)]
+        fn store(self, to: &mut [f64; WIDTH]) {
+            unsafe { _mm512_storeu_pd(to.as_mut_ptr(), self.0) }
+        }
+        #[inline(always)]
+        fn splat(value: f64) -> Self {
+            unsafe { Self(_mm512_set1_pd(value)) }
+        }
+        #[inline(always)]
+        fn add(self, other: Self) -> Self {
+            unsafe { Self(_mm512_add_pd(self.0, other.0)) }
+        }
+        #[inline(always)]
+        fn sub(self, other: Self) -> Self {
+            unsafe { Self(_mm512_sub_pd(self.0, other.0)) }
+        }
+        #[inline(always)]
+        fn mul(self, other: Self) -> Self {
+            unsafe { Self(_mm512_mul_pd(self.0, other.0)) }
+        }
+        #[inline(always)]
+        fn div(self, other: Self) -> Self {
+            unsafe { Self(_mm512_div_pd(self.0, other.0)) }
+        }
+        #[inline(always)]
+        fn mul_add(self, a: Self, b: Self) -> Self {
+            unsafe { Self(_mm512_fmadd_pd(self.0, a.0, b.0)) }
+        }
+        #[inline(always)]
+        fn negative_mul_add(self, a: Self, b: Self) -> Self {
+            unsafe { Self(_mm512_fnmadd_pd(self.0, a.0, b.0)) }
+        }
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            unsafe { Self(_mm512_max_pd(self.0, other.0)) }
+        }
+        #[inline(always)]
+        fn sqrt(self) -> Self {
+            unsafe { Self(_mm512_sqrt_pd(self.0)) }
+        }
+    }
+}

@@ -1,0 +1,86 @@
+"""Certified poles against poles in 50 digits; the two solvers against each other."""
+
+import mpmath
+import numpy as np
+import pandas as pd
+import pytest
+
+from conftest import ROOT, tvse
+
+DIGITS = 50
+KEY = ["population", "case", "variant", "flight_time_s"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A small reference campaign with every pole, audited."""
+    folder = tmp_path_factory.mktemp("spectrum") / "run"
+    out = tvse("run", ROOT / "runs/reference.toml", "--cases", 6, "--poles", "all", "--audit", 4, "--output", folder)
+    assert ": agreed" in out
+    return folder
+
+
+def refined(matrices, pole, gap):
+    """The pole in many digits: root of the Rayleigh functional with vectors in double precision, whose errors enter
+    by their product; and the size of that product."""
+    m, d, k = matrices
+    pencil = pole * pole * m + pole * d + k
+    scale = 1 / np.sqrt(np.abs(np.diag(m)) * abs(pole) ** 2 + np.abs(np.diag(k)))
+    u, _, vh = np.linalg.svd(scale[:, None] * pencil * scale)
+    left, right = np.conj(u[:, -1]) * scale, np.conj(vh[-1]) * scale
+    with mpmath.workdps(DIGITS):
+        exact = lambda a: mpmath.matrix(a.tolist())
+        y, x = exact(left[None, :]), exact(right[:, None])
+        forms = [(y * exact(a) * x)[0] for a in (m, d, k)]
+        s = mpmath.mpc(pole)
+        for _ in range(6):
+            s -= (forms[0] * s * s + forms[1] * s + forms[2]) / (2 * forms[0] * s + forms[1])
+        off = abs(s - mpmath.mpc(pole))
+    return float(off), (1e-15 * abs(pole) / gap) ** 2 * gap
+
+
+def test_poles_are_within_their_bounds_of_poles_in_fifty_digits(folder):
+    modes = pd.read_parquet(folder / "tables/modes.parquet")
+    assert (modes["certificate"] == "discs").all() and (modes["solver"] == "structured").all()
+    case = 3
+    replay = folder / "replay"
+    tvse("replay", folder, "--case", case, "--output", replay)
+    entries = pd.read_parquet(replay / "matrices.parquet")
+    checked = 0
+    for variant in ["no_jet_damping", "jet_damping"]:
+        rows = modes[(modes["population"] == "dispersed") & (modes["case"] == case)]
+        rows = rows[(rows["variant"] == variant) & (rows["flight_time_s"] == 105.0)]
+        found = entries[(entries["variant"] == variant) & (entries["flight_time_s"] == 105.0)]
+        size = 1 + int(found[found["matrix"] == "K"]["row"].max())
+        matrices = []
+        for name in "MDK":
+            matrix = np.zeros((size, size))
+            one = found[found["matrix"] == name]
+            matrix[one["row"].astype(int), one["column"].astype(int)] = one["value"]
+            matrices.append(matrix)
+        poles = rows["pole_re_rad_s"].to_numpy() + 1j * rows["pole_im_rad_s"].to_numpy()
+        bounds = rows["pole_error_bound_rad_s"].to_numpy()
+        assert len(poles) == size and (bounds < 1e-10 * np.abs(poles)).all()
+        for index, pole in enumerate(poles):
+            gap = np.abs(np.delete(poles, index) - pole).min()
+            off, uncertain = refined(matrices, pole, gap)
+            assert off <= bounds[index] + uncertain, (variant, pole, off, bounds[index])
+            checked += 1
+    assert checked >= 50
+
+
+def test_both_solvers_find_the_same_poles(folder, tmp_path):
+    tvse("run", ROOT / "runs/reference.toml", "--cases", 6, "--solver", "dense", "--output", tmp_path / "dense")
+    dense = pd.read_parquet(tmp_path / "dense/tables/modes.parquet")
+    assert (dense["certificate"] == "residual").all() and (dense["determinants"] == 0).all()
+    ours = pd.read_parquet(folder / "tables/modes.parquet")
+    ours = ours[ours["mode"].notna()]
+    both = ours.merge(dense, on=[*KEY, "mode", "branch"], suffixes=("", "_dense"))
+    assert len(both) == len(ours) == len(dense)
+    assert (np.abs(both["damping_ratio"] - both["damping_ratio_dense"]) < 1e-10).all()
+    off = np.hypot(both["pole_re_rad_s"] - both["pole_re_rad_s_dense"], both["pole_im_rad_s"] - both["pole_im_rad_s_dense"])
+    assert (off <= both["pole_error_bound_rad_s"] + 2 * both["pole_error_bound_rad_s_dense"] + 1e-11).all()
+
+
+def test_a_replay_uses_the_solver_of_the_run(folder):
+    assert "bit for bit as stored" in tvse("replay", folder, "--case", 1)
