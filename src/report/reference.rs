@@ -221,7 +221,7 @@ pub const METHODS: [Assumed; 7] = [
 ];
 
 /// Statistics of gates, by their word in gate files.
-pub const GATES: [Assumed; 6] = [
+pub const GATES: [Assumed; 8] = [
     assumed(
         "minimum",
         "The least value of the cases",
@@ -251,6 +251,16 @@ pub const GATES: [Assumed; 6] = [
         "tolerance_bound",
         "What a share of the population keeps, with a consumer's risk",
         "Independent draws; failed cases lie on the worse side. No law is assumed.",
+    ),
+    assumed(
+        "nested_statement",
+        "Share of outer draws of a nested plan that meet its statement, by its exact bound",
+        "Independent outer draws, and independent inner cases within each; failed cases count as below. An outer draw that is undecided does not meet it.",
+    ),
+    assumed(
+        "worst_on_worst",
+        "The worst that a search found in a region of the draws",
+        "Nothing about a population: it was searched for, not sampled. A search may miss a worse point.",
     ),
 ];
 

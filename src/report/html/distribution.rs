@@ -142,17 +142,20 @@ fn gate((index, gated): (usize, &Gated)) -> Option<Figure> {
         label = label.replacen(',', " less the baseline run,", 1);
     }
     let threshold = match &gate.statistic {
-        Statistic::ShareBelow { threshold, .. } | Statistic::ShareAbove { threshold, .. } => {
-            Some(threshold.base())
-        }
+        Statistic::ShareBelow { threshold, .. }
+        | Statistic::ShareAbove { threshold, .. }
+        | Statistic::NestedStatement { threshold, .. } => Some(threshold.base()),
         _ => None,
     };
+    // The limit of a nested statement is a share of outer draws, which has no place here.
+    let of_outer = matches!(gate.statistic, Statistic::NestedStatement { .. });
     // In the unit of the metric; of a gate on a share, the share.
     let scale = gate.limit.quantity.scale();
     let limit = gate.limit.quantity.base();
     let bound = outcome.bound.map(|bound| bound * scale);
     let below = match (threshold, gate.limit.sense, &gate.statistic) {
         (None, sense, _) => sense == Sense::AtLeast,
+        (_, _, Statistic::NestedStatement { .. }) => true,
         (_, sense, Statistic::ShareBelow { .. }) => sense == Sense::AtMost,
         (_, sense, _) => sense == Sense::AtLeast,
     };
@@ -189,7 +192,9 @@ fn gate((index, gated): (usize, &Gated)) -> Option<Figure> {
     let word = if threshold.is_some() { "threshold" } else { "limit" };
     let text = format!("{word} {}", number(marked * factor));
     panel.text((marked * factor, high), (moved, 14.0), anchor, "limit-text", &text);
-    if threshold.is_some() {
+    if of_outer {
+        // Only the threshold of its cases is drawn.
+    } else if threshold.is_some() {
         let level = |share: f64| {
             let at_or_below = if matches!(gate.statistic, Statistic::ShareBelow { .. }) {
                 share
