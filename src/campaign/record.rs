@@ -118,7 +118,7 @@ pub struct Pole {
     pub participation: Option<[f64; Part::ALL.len()]>,
     /// Relative residual of the eigenpair, −; `None` where no vector was computed.
     pub residual: Option<f64>,
-    /// Bound of the pole's error, rad/s: proven where the certificate says so, else to first order from the
+    /// Bound of the pole's error, rad/s: by discs where the certificate says so, else to first order from the
     /// residual; `None` where there is none.
     pub error_bound: Option<f64>,
     /// Derivatives, where the run stores them.

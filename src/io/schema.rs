@@ -383,7 +383,7 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
         number(
             "pole_error_bound_rad_s",
             "rad/s",
-            "Bound of the distance of the pole from an exact one: proven by discs, to first order from the \
+            "Bound of the distance of the pole from an exact one: by discs with rounding estimated, to first order from the \
              residual where the certificate is residual; NULL if there is none",
             |p| p.error_bound,
         ),
