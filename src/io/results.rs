@@ -344,7 +344,7 @@ mod tests {
             expected.push(("corner_dispersed".to_owned(), 0));
             expected
         };
-        assert_eq!(TableName::Cases.group_cases(&cases::outline(&CASES, StoredPoles::All)), 32768);
+        assert_eq!(TableName::Cases.group_cases(&cases::outline(&CASES, StoredPoles::All)), 16384);
         assert_eq!(first_cases(TableName::Cases), expected(&[0]));
         assert_eq!(first_cases(TableName::Modes), expected(&[0, 256, 512, 768, 1024]));
     }
