@@ -2,6 +2,7 @@
 
 use super::interrupt::Interrupt;
 use super::{Error, FAIL, PASS, campaign, run::unprepared, selection};
+use crate::campaign::definition::Solver;
 use crate::campaign::worst::{
     self, Aim, Method, Quantity, Standing, WorstCase, search::MOST_CORNER_KEYS,
 };
@@ -295,6 +296,8 @@ pub fn replay(
         populations: vec![population],
         sensitivity: None,
         margins: None,
+        // That of the search, whatever the run's.
+        solver: Solver::Dense,
         ..outline.definition.clone()
     };
     let sampler = loaded.sampler(&definition)?;

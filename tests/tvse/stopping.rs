@@ -41,10 +41,10 @@ fn resumed(study: &Study, folder: &str, more: &[&str]) -> Said {
 #[test]
 fn a_signal_stops_a_run_which_says_how_to_go_on_and_ends_with_the_same_bytes() {
     let study = Study::new().with_corner();
-    let cases = ["--cases", "150"];
+    let cases = ["--cases", "3000"];
     study.run("plain", &cases);
     for (signal, code) in [("INT", 130), ("TERM", 143)] {
-        let more = ["-o", "result", "--cases", "150", "--progress", "json"];
+        let more = ["-o", "result", "--cases", "3000", "--progress", "json"];
         let child = begun(&study, &more);
         wait_for("the first case", || study.path("result/started.json").exists());
         std::thread::sleep(Duration::from_millis(200));
