@@ -2,7 +2,7 @@
 //! bounded descent with analytic derivatives.
 //!
 //! What is found was looked for: it is [`Drawing::Selected`], from which no share of a population
-//! follows. How a search is carried out is in [`search`], the descent itself in [`descent`].
+//! follows. How a search is carried out is in [`mod@search`], the descent itself in [`descent`].
 
 pub mod descent;
 pub mod objective;

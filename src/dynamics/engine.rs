@@ -315,7 +315,7 @@ impl Attachment {
     /// The part of one drawn engine in the form of [`super::gradient`] (without actuators), and its
     /// gradient with the mean acceleration held.
     ///
-    /// Term by term as it is added to the model; by the projections of a [`Side`] the form is of at most
+    /// Term by term as it is added to the model; by the projections of a `Side` the form is of at most
     /// the second degree in each number.
     pub fn form(
         &self,
