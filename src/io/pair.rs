@@ -4,7 +4,7 @@
 //! What differences are worth is decided in `campaign::statistics` and `gate`.
 
 use super::run::Run;
-use super::source::{Value, less_stable_values};
+use super::source::{Value, case_value, less_stable_values};
 use crate::gate::{CaseValue, Names, Query, Region, Searched, Source, Table, reduce};
 use crate::problem::Problems;
 use std::ops::Range;
@@ -123,12 +123,7 @@ impl Pair<'_> {
         let of = |run: &Run| {
             let mut found = Vec::new();
             run.cases(population(run, query), &[&query.metric.name], |case, values, failure| {
-                let value = match failure {
-                    _ if !values[0].is_nan() => Ok(Some(values[0])),
-                    Some(failure) => Err(failure.to_string()),
-                    None => Ok(None),
-                };
-                found.push((case, vec![value]));
+                found.push((case, vec![case_value(values, failure)]));
                 Ok(())
             })?;
             Ok::<_, Problems>(found)

@@ -5,6 +5,7 @@
 use super::column::{Column, Get};
 use super::run::Run;
 use super::schema;
+use crate::campaign::Failure;
 use crate::campaign::row::ModeRow;
 use crate::campaign::{Outline, Sample};
 use crate::gate::{
@@ -129,13 +130,18 @@ fn of_cases(
     visit: Visit<'_>,
 ) -> Result<(), Problems> {
     run.cases(population, &[&query.metric.name], |case, values, failure| {
-        let row = match failure {
-            _ if !values[0].is_nan() => Ok(Some(values[0])),
-            Some(failure) => Err(failure.to_string()),
-            None => Ok(None),
-        };
+        let row = case_value(values, failure);
         visit(CaseValue { case, value: reduce([row], query.metric, query.worst) })
     })
+}
+
+/// The value of a case in the one column that was asked of its table.
+pub(super) fn case_value(values: &[f64], failure: Option<Failure>) -> Value {
+    match failure {
+        _ if !values[0].is_nan() => Ok(Some(values[0])),
+        Some(failure) => Err(failure.to_string()),
+        None => Ok(None),
+    }
 }
 
 /// A row of a case: its damping ratio, by which the less stable pole is told, and its value.
