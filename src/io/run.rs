@@ -233,15 +233,15 @@ impl Run {
         let is_draw = |name: &str| draws.iter().any(|draw| draw.column == name);
         let chosen =
             |name: &str| name == "case" || is_draw(name) || scores.iter().any(|s| s == name);
-        let group = TableName::Cases.group_cases(&self.outline);
+        let block = TableName::Cases.block_cases(&self.outline);
         let mut wanted: BTreeMap<u64, Vec<u64>> = BTreeMap::new();
         for case in cases {
-            wanted.entry(case / group).or_default().push(case);
+            wanted.entry(case / block).or_default().push(case);
         }
         let mut found = BTreeMap::new();
         for (index, cases) in wanted {
-            let mut next = index * group;
-            let range = next..next + 1;
+            let mut next = index * block;
+            let range = next..next + block;
             let mut reader = self.reader(TableName::Cases, chosen, population, &range)?;
             while let Some(batch) = self.next(TableName::Cases, &mut reader)? {
                 self.check_cases(&batch, next)?;
@@ -329,7 +329,8 @@ impl Run {
         populations.iter().map(|p| p.cases.div_ceil(cases)).sum()
     }
 
-    /// Reads chosen columns of the row groups that hold some cases of a population.
+    /// Reads chosen columns of the row groups that hold some cases of a population; of the `cases`
+    /// table, just their rows.
     fn reader(
         &self,
         table: TableName,
@@ -357,6 +358,12 @@ impl Run {
             .with_projection(mask)
             .with_row_groups(wanted.map(|group| group as usize).collect())
             .with_batch_size(BATCH);
+        let builder = match table {
+            TableName::Cases => builder
+                .with_offset((cases.start % size) as usize)
+                .with_limit(end.saturating_sub(cases.start) as usize),
+            _ => builder,
+        };
         decoded(|| builder.build()).map_err(|found| self.damage(table, found, "a Parquet table"))
     }
 
