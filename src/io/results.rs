@@ -164,12 +164,20 @@ impl Results {
         let next = store.folder().join(NEXT);
         files::ensure_folder(&next.join(TABLES))?;
         let mut contents = BTreeMap::new();
-        for table in TableName::of_cases(store.outline()) {
-            contents.insert(table, assemble::assemble(store, table, &next)?);
+        for tables in TableName::of_cases(store.outline()).chunks(jobs.max(1)) {
+            let assembled = at_once(tables, |table| assemble::assemble(store, *table, &next));
+            for (table, content) in tables.iter().zip(assembled) {
+                contents.insert(*table, content?);
+            }
         }
         let mut run = Run::of(&next, store.outline().clone(), contents);
-        let rows = summarise::summary(&run, summarise::MEMORY)?;
-        let worst_rows = summarise::worst(&run, worst)?;
+        let (rows, worst_rows) = std::thread::scope(|scope| {
+            let worst = || summarise::worst(&run, worst);
+            let aside = (jobs > 1).then(|| scope.spawn(worst));
+            let rows = summarise::summary(&run, summarise::MEMORY);
+            (rows, aside.map_or_else(worst, joined))
+        });
+        let (rows, worst_rows) = (rows?, worst_rows?);
         let outline = run.outline();
         let described = schema::dictionary(outline);
         let write = Writing { folder: store.folder(), next: &next, outline };
@@ -206,6 +214,21 @@ impl Results {
     }
 }
 
+/// What `work` makes of each item, each on its own thread; of one item, on this one.
+fn at_once<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let work = &work;
+    std::thread::scope(|scope| {
+        let Some((first, others)) = items.split_first() else { return Vec::new() };
+        let others: Vec<_> = others.iter().map(|item| scope.spawn(move || work(item))).collect();
+        std::iter::once(work(first)).chain(others.into_iter().map(joined)).collect()
+    })
+}
+
+/// What a thread made, or its panic.
+fn joined<R>(thread: std::thread::ScopedJoinHandle<'_, R>) -> R {
+    thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
 /// Where tables that are made of others are written.
 struct Writing<'a> {
     folder: &'a Path,
@@ -225,8 +248,7 @@ impl Writing<'_> {
         let text = serde_json::to_string(self.outline).expect("an outline has text keys only");
         // Written aside elsewhere: a folder of tables holds nothing else, whatever happens.
         let aside = Aside::within(self.folder, &target)?;
-        let mut table =
-            Table::new(columns, &metadata(name, &text), aside, None).map_err(failed)?;
+        let mut table = Table::new(columns, &metadata(name, &text), aside, None).map_err(failed)?;
         rows.iter().for_each(|row| table.push(row));
         let (aside, content) = table.close().map_err(failed)?;
         aside.finish()?;

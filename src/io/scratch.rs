@@ -111,7 +111,8 @@ mod tests {
         let scratch = Scratch::within(folder.path()).unwrap();
         for _ in 0..2 {
             let mut columns = [pages(&scratch), pages(&scratch)];
-            let page = |column: usize, number: usize| vec![(7 * column + number) as u8; 100 + number];
+            let page =
+                |column: usize, number: usize| vec![(7 * column + number) as u8; 100 + number];
             let mut keys = [Vec::new(), Vec::new()];
             for number in 0..5 {
                 for column in 0..2 {
