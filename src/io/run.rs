@@ -95,6 +95,26 @@ impl Run {
         problems.into_result(run)
     }
 
+    /// Holds the tables of the run in `folder` against their sizes alone.
+    ///
+    /// # Errors
+    /// Damage: every table that is missing or of another size; a manifest that cannot be read.
+    pub(super) fn sizes(folder: &Path) -> Result<(), Problems> {
+        let manifest = Manifest::read(folder)?;
+        let mut problems = Problems::default();
+        for table in TableName::of_run(&manifest.run) {
+            let path = folder.join(table.file());
+            let found = files::size(&path).map_err(|error| error.to_string());
+            let allowed = manifest.tables.get(table.name()).map(|content| content.bytes);
+            if found.as_ref().ok() != allowed.as_ref() {
+                let found = found.map_or_else(|error| error, |bytes| format!("{bytes} bytes"));
+                let allowed = allowed.map_or("no such table".to_owned(), |b| format!("{b} bytes"));
+                problems.push(Kind::Damage, files::name(&path), "", found, allowed);
+            }
+        }
+        problems.into_result(())
+    }
+
     pub(super) fn of(
         folder: &Path,
         outline: Outline,
