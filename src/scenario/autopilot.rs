@@ -325,6 +325,11 @@ fn allocation(
     if !good {
         return None;
     }
+    if let (Some(_), Some(time)) = (&file.matrix, file.time_s) {
+        let found = format!("{time} s beside `matrix`, which does not depend on it");
+        findings.push("autopilot.allocation.time_s", found, "one of both");
+        return None;
+    }
     let matrix = match &file.matrix {
         Some(matrix) if matrix.len() == gimbals.len() => matrix.clone(),
         Some(matrix) => {

@@ -177,6 +177,14 @@ fn what_is_wrong_with_an_autopilot_is_said_with_its_key() {
             "autopilot.allocation.time_s",
             "80.0",
         ),
+        (
+            "gimbals = [\"booster.*.*\"]",
+            "gimbals = [\"booster.*.*\"]\ntime_s = 80.0\nmatrix = [[1.0, 0.0, 0.0]]",
+            "autopilot.allocation.time_s",
+            "one of both",
+        ),
+        ("kind = \"notch\"", "kind = \"nothc\"", "autopilot.path[1].filter[0].kind", "`notch`"),
+        ("kind = \"notch\", ", "", "autopilot.path[1].filter[0].kind", "one of gain, lag,"),
     ] {
         if key.is_empty() {
             // A low pass in the loop: nothing is passed on at once.
