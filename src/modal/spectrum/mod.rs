@@ -4,6 +4,7 @@
 //! that these values determine are found and certified by discs (`secular`). What cannot be certified is left to
 //! the dense solver, `eigen`.
 
+mod elimination;
 pub mod lanes;
 mod pencil;
 mod predict;
