@@ -379,8 +379,7 @@ impl<'a> Evaluator<'a> {
             let place = self.place(at, variant, draws, &chain, vehicle);
             let buffers = Buffers::of(buffers, place.plant.layout.coordinates());
             place.plant.assemble(vehicle, place.effects, &mut buffers.model);
-            let solved = buffers.solver.poles(&buffers.model, poles);
-            solved.map_err(|error| Failure::from(&error))?;
+            find_poles(at.variants[variant].base.as_ref(), buffers, poles)?;
             let Buffers { model, scratch, solver, .. } = buffers;
             let mut solved = Solved::new(model, poles);
             let found = self.identify(at, [variant, mode], &mut solved, solver, scratch)?;

@@ -4,7 +4,7 @@
 //! Hessenberg QR, all sequential and in buffers that are reused; what poles mean is decided in
 //! `identify`.
 
-use super::elimination::Elimination;
+use super::factors::Factors;
 use crate::dynamics::Model;
 use crate::dynamics::servo::Row;
 use crate::vehicle::StateSpace;
@@ -76,7 +76,7 @@ pub struct Solver {
     kept: Vec<usize>,
     real: Vec<f64>,
     imaginary: Vec<f64>,
-    pencil: Elimination,
+    pencil: Factors,
     /// Power of two by which each coordinate is scaled in the pencil.
     scale: Vec<f64>,
     right: Vec<c64>,
@@ -115,7 +115,7 @@ impl Solver {
             kept: Vec::with_capacity(states),
             real: vec![0.0; states],
             imaginary: vec![0.0; states],
-            pencil: Elimination::new(coordinates),
+            pencil: Factors::new(coordinates),
             scale: vec![1.0; coordinates],
             right: Vec::with_capacity(coordinates),
             left: Vec::with_capacity(coordinates),

@@ -1,4 +1,4 @@
-//! Elimination of one complex matrix, eight rows at a time: `P A = L U` with partial pivoting, and the solutions
+//! Factors of one complex matrix, made eight rows at a time: `P A = L U` with partial pivoting, and the solutions
 //! of `A x = b` and `Aᴴ y = b`.
 //!
 //! Which matrix it is, and what solutions mean, is decided in `eigen`.
@@ -7,7 +7,7 @@ use super::spectrum::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
 use faer::c64;
 
 /// A matrix, then its factors; columns stand in blocks of eight rows, the last of which ends in zeros.
-pub struct Elimination {
+pub struct Factors {
     level: Level,
     size: usize,
     /// The matrix, then what is above its diagonal; zero elsewhere.
@@ -37,7 +37,7 @@ fn swap(column: &mut [Complexes], a: usize, b: usize) {
     set(column, b, at_a);
 }
 
-impl Elimination {
+impl Factors {
     /// Buffers for matrices of `size` rows.
     pub fn new(size: usize) -> Self {
         Self::with(size, Level::best())
@@ -115,7 +115,7 @@ fn product<V: Vector>(column: &[Complexes], vector: &[Complexes]) -> c64 {
     c64::new(lanes.re.iter().sum(), lanes.im.iter().sum())
 }
 
-struct Factor<'a>(&'a mut Elimination);
+struct Factor<'a>(&'a mut Factors);
 
 impl Kernel for Factor<'_> {
     type Output = ();
@@ -123,7 +123,7 @@ impl Kernel for Factor<'_> {
     /// Column by column from the left.
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Elimination { size, upper, lower, pivots, exchanges, work, .. } = self.0;
+        let Factors { size, upper, lower, pivots, exchanges, work, .. } = self.0;
         let blocks = work.len();
         let mut largest = 0.0_f64;
         for j in 0..*size {
@@ -202,7 +202,7 @@ fn column(of: &[Complexes], k: usize, blocks: usize) -> &[Complexes] {
 }
 
 struct Solve<'a> {
-    factors: &'a mut Elimination,
+    factors: &'a mut Factors,
     b: &'a mut [c64],
     adjoint: bool,
 }
@@ -212,7 +212,7 @@ impl Kernel for Solve<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Elimination { size, upper, lower, pivots, exchanges, work, .. } = self.factors;
+        let Factors { size, upper, lower, pivots, exchanges, work, .. } = self.factors;
         let (size, blocks, b) = (*size, work.len(), self.b);
         work.fill(Complexes::ZERO);
         b.iter().enumerate().for_each(|(row, value)| set(work, row, *value));
@@ -281,21 +281,21 @@ mod tests {
     fn solutions_satisfy_their_equations_at_every_size_and_level() {
         for level in Level::all() {
             for size in [1, 2, 7, 8, 9, 16, 41, 80] {
-                let mut elimination = Elimination::with(size, level);
+                let mut factors = Factors::with(size, level);
                 let matrix = |row: usize, column: usize| {
                     if size == 1 { c64::new(2.0, 1.0) } else { entry(size, row, column) }
                 };
                 // Twice, since buffers are reused.
                 for _ in 0..2 {
                     for column in 0..size {
-                        elimination.set_column(column, (0..size).map(|row| matrix(row, column)));
+                        factors.set_column(column, (0..size).map(|row| matrix(row, column)));
                     }
-                    elimination.factor();
+                    factors.factor();
                 }
                 let b: Vec<c64> = (0..size).map(|i| c64::new(odd(i + 31), odd(i + 77))).collect();
                 let (mut x, mut y) = (b.clone(), b.clone());
-                elimination.solve(&mut x);
-                elimination.solve_adjoint(&mut y);
+                factors.solve(&mut x);
+                factors.solve_adjoint(&mut y);
                 // Backward stable to n ε ‖A‖ ‖x‖ times the growth of pivots, here below ten.
                 let bound = |v: &[c64]| {
                     let norm = v.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
@@ -314,17 +314,17 @@ mod tests {
     #[test]
     fn a_singular_matrix_gives_its_null_vectors() {
         // Rows 1, 2, 3 of an arithmetic progression: A (1, −2, 1)ᵀ = 0 and (1, −2, 1) A = 0.
-        let mut elimination = Elimination::new(3);
+        let mut factors = Factors::new(3);
         for column in 0..3 {
             let entry = |row: usize| c64::new((3 * row + column + 1) as f64, 0.0);
-            elimination.set_column(column, (0..3).map(entry));
+            factors.set_column(column, (0..3).map(entry));
         }
-        elimination.factor();
+        factors.factor();
         let (mut x, mut y) = (vec![c64::new(1.0, 0.5); 3], vec![c64::new(1.0, 0.2); 3]);
         x[0] = c64::new(3.0, 0.0);
         y[0] = c64::new(3.0, 0.0);
-        elimination.solve(&mut x);
-        elimination.solve_adjoint(&mut y);
+        factors.solve(&mut x);
+        factors.solve_adjoint(&mut y);
         for v in [x, y] {
             assert!(v.iter().all(|z| z.is_finite()));
             for (i, expected) in [1.0, -2.0, 1.0].into_iter().enumerate() {
@@ -337,14 +337,14 @@ mod tests {
     fn avx2_and_avx_512_give_the_same_bits() {
         let solutions =
             Level::all().into_iter().filter(|level| *level != Level::Portable).map(|level| {
-                let mut elimination = Elimination::with(21, level);
+                let mut factors = Factors::with(21, level);
                 for column in 0..21 {
-                    elimination.set_column(column, (0..21).map(|row| entry(21, row, column)));
+                    factors.set_column(column, (0..21).map(|row| entry(21, row, column)));
                 }
-                elimination.factor();
+                factors.factor();
                 let mut x = vec![c64::new(1.0, -0.5); 21];
-                elimination.solve(&mut x);
-                elimination.solve_adjoint(&mut x);
+                factors.solve(&mut x);
+                factors.solve_adjoint(&mut x);
                 x
             });
         let solutions: Vec<_> = solutions.collect();
