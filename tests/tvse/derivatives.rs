@@ -530,11 +530,9 @@ fn a_search_begins_anew_at_a_mode_switch_and_does_not_report_the_other_mode() {
     for index in 0..beyond.populations.len() {
         let record = evaluator.evaluate(index, 0);
         let poles = record.evaluations[0].outcome.as_ref().unwrap();
-        let near = |pole: Complex<f64>| {
-            let all = poles.iter().map(|found| found.value);
-            all.min_by(|a, b| (a - pole).norm().total_cmp(&(b - pole).norm())).unwrap()
-        };
-        pole = near(pole);
+        let all = poles.iter().map(|found| found.value);
+        let distance = |of: &Complex<f64>| (of - pole).norm();
+        pole = all.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
         named = poles.iter().find(|pole| pole.mode == Some(0)).unwrap().value;
     }
     let ratio = |pole: Complex<f64>| -pole.re / pole.norm();
