@@ -43,6 +43,14 @@ impl AerodynamicPlant {
         drawn.dynamic_pressure_pa * self.area_m2 * drawn.axial_force
     }
 
+    /// Whether the rigid motion acts by the angle of attack and its rates alone, not by a generalised matrix.
+    pub fn feels_attack_alone(&self, layout: &Layout) -> bool {
+        let rigid = |entry: &Entry| {
+            layout.translation().contains(&entry.column) || layout.rotation().contains(&entry.column)
+        };
+        !self.entries.iter().any(rigid)
+    }
+
     /// Adds forces and moments, scaled by `factor`, to the model.
     ///
     /// The body's transverse velocity relative to the air at the centre of pressure, `x_cp` aft of the

@@ -104,7 +104,10 @@ impl Reference {
                     if rate { (s * right, mass) } else { (right, s * mass + damping) };
                 if let Some(motion) = &model.null_motion {
                     let ratio = motion.others.iter().find(|(other, _)| *other == state);
-                    let left_out = s * self.pair.right[motion.state - n];
+                    let left_out = match motion.state.checked_sub(n) {
+                        Some(at) => s * self.pair.right[at],
+                        None => self.pair.right[motion.state],
+                    };
                     right -= ratio.map_or(0.0, |(_, ratio)| *ratio) * left_out;
                 }
                 (right, (left * scale).conj())

@@ -46,6 +46,24 @@ impl Law {
         }
     }
 
+    /// Most poles at the origin with the nozzle held; the same for every draw.
+    pub fn poles_at_origin(&self) -> usize {
+        match self {
+            Self::SecondOrder(_) | Self::Electrohydraulic(_) => 0,
+            Self::TransferFunction(law) => {
+                let command = law.command.as_ref().map_or(0, |command| command.poles_at_origin());
+                command + law.stiffness.poles_at_origin()
+            }
+            // Of given matrices the rank tells.
+            Self::StateSpace(law) => {
+                let a = &law.system.a;
+                let values = a.singular_values();
+                let least = a.nrows() as f64 * f64::EPSILON * values.max();
+                values.iter().filter(|value| !(**value > least)).count()
+            }
+        }
+    }
+
     /// Number of states; the same for every draw.
     pub fn order(&self) -> usize {
         self.state_space().order()

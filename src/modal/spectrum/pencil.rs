@@ -78,6 +78,10 @@ impl Pencil {
     /// definite.
     pub fn set(&mut self, model: &Model) -> bool {
         let (size, n) = (self.size, model.second_order);
+        // A turn with a velocity is left to the dense solver.
+        if model.null_motion.as_ref().is_some_and(|motion| motion.state < n) {
+            return false;
+        }
         for (column, degree) in self.degree.iter_mut().enumerate() {
             let null = |state| usize::from(model.null_states.contains(&state));
             *degree = if column < n { null(column) + null(n + column) } else { 0 };
