@@ -172,6 +172,13 @@ pub fn find_null_states(layout: &Layout, steady: &Steady<'_>, model: &mut Model)
     let left_out = layout.rotation().filter(|at| positions.contains(at)).count()
         + turning.filter(|state| rates.contains(state)).count();
     model.at_origin += turns.saturating_sub(left_out);
+    // Nor does sensing hold a rotation about which nothing exerts a moment: its momentum stays.
+    let empty = |matrix: &faer::Mat<f64>, at: usize| matrix.row(at).iter().all(|x| *x == 0.0);
+    for (at, _) in layout.rotation().zip(steady.sensed).filter(|(_, sensed)| **sensed) {
+        if empty(&model.stiffness, at) {
+            model.at_origin += 1 + usize::from(empty(&model.damping, at));
+        }
+    }
     positions.sort_unstable();
     model.null_states.clear();
     model.null_states.extend(positions.into_iter().chain(rates));

@@ -468,5 +468,12 @@ mod tests {
         assert!(matches!(solver.poles(&huge, &mut poles), Err(Error::Spread { .. })));
         huge.stiffness[(2, 2)] = 1e12;
         assert_eq!(solver.poles(&huge, &mut poles), Ok(()));
+        // A pole at the origin is one only where the equations may have it.
+        let mut free = model([1.0, 1.1], 0.0, 0.0);
+        free.stiffness[(1, 1)] = 0.0;
+        assert!(matches!(solver.poles(&free, &mut poles), Err(Error::Spread { .. })));
+        free.at_origin = 1;
+        assert_eq!(solver.poles(&free, &mut poles), Ok(()));
+        assert_eq!(poles.len(), 3);
     }
 }
