@@ -271,7 +271,8 @@ impl Planar {
     }
 
     /// The four poles, rad/s, by ascending |Im s| and then Re s; conjugate pairs have the pole
-    /// above the axis first. `None` if the iteration does not converge.
+    /// above the axis first. `None` if the iteration does not converge, or where the poles are so far apart
+    /// that half of the digits of their product are lost.
     pub fn poles(&self) -> Option<[Complex<f64>; 4]> {
         let a = self.quartic();
         // In t = s/σ the product of the roots is one: a companion matrix without large entries.
@@ -288,11 +289,15 @@ impl Planar {
             }
         }
         let start = Schur::try_new(companion, f64::EPSILON, 1000)?.complex_eigenvalues();
-        let mut poles: [Complex<f64>; 4] = std::array::from_fn(|i| {
+        let roots: [Complex<f64>; 4] = std::array::from_fn(|i| {
             let polished = polish(&monic, Complex::new(start[i].re, start[i].im.abs()));
-            let above = start[i].im >= 0.0;
-            if above { polished * sigma } else { polished.conj() * sigma }
+            if start[i].im >= 0.0 { polished } else { polished.conj() }
         });
+        let product: f64 = roots.iter().map(|t| t.norm()).product();
+        if !((product - 1.0).abs() <= f64::EPSILON.sqrt()) {
+            return None;
+        }
+        let mut poles = roots.map(|t| t * sigma);
         let key = |p: &Complex<f64>| (p.im.abs(), p.re, -p.im);
         poles.sort_by(|x, y| {
             let ((x0, x1, x2), (y0, y1, y2)) = (key(x), key(y));

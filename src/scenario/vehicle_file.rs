@@ -298,7 +298,7 @@ pub struct ActuatorFile {
     pub transfer_function: Option<TransferFunctionFile>,
     /// Matrices of an actuator in state space.
     pub state_space: Option<StateSpaceFile>,
-    /// Whether the flex bearing is part of the actuator's stiffness (default: included for
+    /// Whether stiffness and damping of the flex bearing are part of the actuator's (default: included for
     /// second-order, separate for electrohydraulic).
     pub bearing: Option<BearingPart>,
 }

@@ -13,12 +13,12 @@ pub use transfer_function::TransferActuator;
 use super::StateSpace;
 use nalgebra::Vector3;
 
-/// Whether the flex bearing is part of the actuator's stiffness.
+/// Whether the flex bearing is part of the actuator's figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bearing {
-    /// The bearing stiffness is inside the actuator stiffness and is not added.
+    /// Stiffness and damping of the bearing are inside those of the actuator and are not added.
     Included,
-    /// The bearing stiffness acts on the gimbal rotation besides the actuator.
+    /// Stiffness and damping of the bearing act on the gimbal rotation besides the actuator.
     Separate,
 }
 
@@ -81,7 +81,7 @@ pub struct Actuator {
     pub attach_m: Vector3<f64>,
     /// Unit action line u_b.
     pub action_line: Vector3<f64>,
-    /// Whether the flex bearing is part of the stiffness.
+    /// Whether the flex bearing is part of its figures.
     pub bearing: Bearing,
     /// Torque law.
     pub law: Law,
