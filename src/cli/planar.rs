@@ -73,7 +73,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Jet::Off)]
     nozzle_jet: Jet,
     /// Prints the poles at COUNT thrusts from FROM to TO as CSV instead
-    #[arg(long, value_name = "FROM:TO:COUNT")]
+    #[arg(long, value_name = "FROM:TO:COUNT", allow_hyphen_values = true)]
     sweep: Option<String>,
     /// Runs a campaign of so many cases around the pair instead
     #[arg(long, value_name = "N", requires = "output", conflicts_with = "sweep",

@@ -26,7 +26,7 @@ pub struct Model {
     /// states per unit of that one. The state matrix is that of the states less this motion.
     pub null_motion: Option<NullMotion>,
     /// Most poles at the origin that the equations may have beside the null states: integrators that
-    /// nothing drives, rotations that nothing senses. Beyond these, a pole lost in the rounding is an error.
+    /// nothing drives, rotations that nothing holds. Beyond these, a pole lost in the rounding is an error.
     pub at_origin: usize,
 }
 

@@ -167,18 +167,11 @@ pub fn find_null_states(layout: &Layout, steady: &Steady<'_>, model: &mut Model)
         rates.sort_unstable();
         model.null_motion = Some(NullMotion { state, others: others.to_vec() });
     }
-    // A turn that nothing senses and its rate: what is not left out may still be at the origin.
-    let turns = 2 * steady.sensed.iter().filter(|sensed| !**sensed).count();
-    let left_out = layout.rotation().filter(|at| positions.contains(at)).count()
-        + turning.filter(|state| rates.contains(state)).count();
-    model.at_origin += turns.saturating_sub(left_out);
-    // Nor does sensing hold a rotation about which nothing exerts a moment: its momentum stays.
-    let empty = |matrix: &faer::Mat<f64>, at: usize| matrix.row(at).iter().all(|x| *x == 0.0);
-    for (at, _) in layout.rotation().zip(steady.sensed).filter(|(_, sensed)| **sensed) {
-        if empty(&model.stiffness, at) {
-            model.at_origin += 1 + usize::from(empty(&model.damping, at));
-        }
-    }
+    // A turn and its rate are at the origin as well where what senses it moves nothing, or nothing turns the
+    // vehicle back: those not left out may be.
+    let turns = layout.rotation().filter(|at| positions.contains(at)).count();
+    let left_out = turns + turning.filter(|state| rates.contains(state)).count();
+    model.at_origin += 2 * layout.rotation().len() - left_out;
     positions.sort_unstable();
     model.null_states.clear();
     model.null_states.extend(positions.into_iter().chain(rates));
