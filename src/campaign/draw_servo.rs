@@ -35,16 +35,16 @@ pub fn actuators(
     Ok(())
 }
 
-/// K_a and C_a = 2 ζ √(J_ref K_nom) of a second-order actuator, the torque of any other, and the flex
-/// bearing where it is separate.
+/// K_a and C_a = 2 ζ √(J_ref K_nom) of a second-order actuator, the torque of any other, and stiffness and
+/// damping of the flex bearing where it is separate.
 pub fn drawn(
     nominal: &Actuator,
-    [bearing_stiffness, bearing_damping]: [f64; 2],
+    bearing: [f64; 2],
     draw: &impl Fn(Quantity, f64) -> Result<f64, Failure>,
 ) -> Result<DrawnActuator, Failure> {
-    let separate = match nominal.bearing {
-        Bearing::Included => 0.0,
-        Bearing::Separate => bearing_stiffness,
+    let [stiffness_n_m_rad, damping_n_m_s_rad] = match nominal.bearing {
+        Bearing::Included => [0.0; 2],
+        Bearing::Separate => bearing,
     };
     let torque = match &nominal.law {
         Law::SecondOrder(law) => {
@@ -52,8 +52,8 @@ pub fn drawn(
             let ratio = draw(Quantity::ActuatorDamping, law.damping_ratio)?;
             let critical = (law.reference_inertia_kg_m2 * law.stiffness_n_m_rad).sqrt();
             let mut spring = DrawnActuator::spring(stiffness, 2.0 * ratio * critical);
-            spring.stiffness_n_m_rad += separate;
-            spring.damping_n_m_s_rad += bearing_damping;
+            spring.stiffness_n_m_rad += stiffness_n_m_rad;
+            spring.damping_n_m_s_rad += damping_n_m_s_rad;
             return Ok(spring);
         }
         Law::Electrohydraulic(law) => electrohydraulic(law, draw)?.state_space(),
@@ -70,7 +70,7 @@ pub fn drawn(
         }
         .state_space(),
     };
-    Ok(DrawnActuator { stiffness_n_m_rad: separate, damping_n_m_s_rad: bearing_damping, torque })
+    Ok(DrawnActuator { stiffness_n_m_rad, damping_n_m_s_rad, torque })
 }
 
 /// The numbers of a torque law that are drawn, with their nominal values.

@@ -240,13 +240,16 @@ impl<'a> Evaluator<'a> {
                     sensitivity.is_some_and(|rule| rule.covers(variant, flight_time, case));
                 let place = self.place(at, variant, draws, &chain, vehicle);
                 let mut solution = None;
+                let mut at_origin = 0;
                 let outcome = drawn.clone().and_then(|()| {
                     let (rows, found) =
                         self.solve(at, &place, (variant, sensitive), buffers, poles)?;
                     solution = Some(found);
+                    let solved: usize = poles.iter().map(|s| if s.im > 0.0 { 2 } else { 1 }).sum();
+                    at_origin = buffers.model.states() - solved;
                     Ok(rows)
                 });
-                let null_poles = buffers.model.null_states.len();
+                let null_poles = buffers.model.null_states.len() + at_origin;
                 let loops = None;
                 let mut evaluation =
                     Evaluation { variant, flight_time, null_poles, solution, outcome, loops };

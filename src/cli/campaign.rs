@@ -288,7 +288,9 @@ fn end(
         writeln!(out, "{}: {} rows", run.path(table).display(), content.rows)?;
     }
     match gates {
-        Some((gates, outputs)) => gate::judge(run, &Judged { folder, gates, outputs }, out),
+        Some((gates, outputs)) => {
+            gate::judge(run, &Judged { folder, gates, outputs, prefix: "" }, out)
+        }
         None => Ok(PASS),
     }
 }

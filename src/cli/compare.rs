@@ -92,7 +92,8 @@ pub fn run(args: &Args, out: &mut dyn std::io::Write) -> Result<u8, Error> {
     selection::write(args.output.as_deref(), &rows)?;
     match &args.gates {
         Some(gates) => {
-            let judged = Judged { folder: &args.first, gates, outputs: &args.outputs };
+            let (folder, outputs) = (&args.first, &args.outputs);
+            let judged = Judged { folder, gates, outputs, prefix: gate::BASELINE };
             gate::judge_pair(&pair, &args.second, &judged, out)
         }
         None => Ok(PASS),

@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 /// Gates on a finished run: a table with a verdict for each, and `gates.json` in the run's folder.
 ///
 /// The cases that count against the gates go to `gate_offenders.parquet` beside it, each with the
-/// command that replays it. Where GITHUB_STEP_SUMMARY is set the outcomes are added to that file as
+/// command that replays it. With a baseline both names begin with `baseline_`, so that they stand beside
+/// those of the run alone. Where GITHUB_STEP_SUMMARY is set the outcomes are added to that file as
 /// Markdown, and with GITHUB_ACTIONS gates that do not pass are printed as annotations.
 ///
 /// Exit codes: 0 every gate passes, 1 one fails, 2 wrong usage or input, 3 incomplete data or
@@ -40,7 +41,8 @@ pub struct Args {
 /// Where outcomes go beside the standard output.
 #[derive(Debug, Default, clap::Args)]
 pub struct Outputs {
-    /// File for the outcomes of the gates (default: gates.json in the run's folder)
+    /// File for the outcomes of the gates (default: gates.json in the run's folder, or
+    /// baseline_gates.json)
     #[arg(long, value_name = "FILE", requires = "gates")]
     json: Option<PathBuf>,
     /// File for the outcomes of the gates as JUnit XML, one test case a gate
@@ -60,7 +62,12 @@ pub struct Judged<'a> {
     pub gates: &'a Path,
     /// Where the outcomes go.
     pub outputs: &'a Outputs,
+    /// What the names of files in the run's folder begin with.
+    pub prefix: &'static str,
 }
+
+/// What the names of files begin with where a baseline was compared with.
+pub const BASELINE: &str = "baseline_";
 
 /// Runs the command.
 ///
@@ -68,7 +75,8 @@ pub struct Judged<'a> {
 /// No such run, damaged tables, a baseline with other draws, or all problems of the gate file.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let run = Run::open(&args.run)?;
-    let judged = Judged { folder: &args.run, gates: &args.gates, outputs: &args.outputs };
+    let prefix = args.baseline.as_ref().map_or("", |_| BASELINE);
+    let judged = Judged { folder: &args.run, gates: &args.gates, outputs: &args.outputs, prefix };
     match &args.baseline {
         None => judge(&run, &judged, out),
         Some(folder) => {
@@ -119,8 +127,9 @@ pub fn judge(source: &impl Source, judged: &Judged<'_>, out: &mut dyn Write) -> 
     let report = Report::new(gate::evaluate(&rules, source, &name)?);
     let folder = files::name(judged.folder);
     let outputs = judged.outputs;
-    let json = outputs.json.clone().unwrap_or_else(|| judged.folder.join("gates.json"));
-    let rows = judged.folder.join(offenders::FILE);
+    let place = |name: &str| judged.folder.join(format!("{}{name}", judged.prefix));
+    let json = outputs.json.clone().unwrap_or_else(|| place("gates.json"));
+    let rows = place(offenders::FILE);
     files::write(&json, report.to_json().as_bytes())?;
     offenders::write(&report, &folder, &rows)?;
     write!(out, "{}", table::gates(&report, &folder))?;

@@ -22,11 +22,11 @@ Examples:
 pub struct Args {
     /// Coefficients of the numerator, highest power of s first
     #[arg(long, value_name = "LIST", value_delimiter = ',', required = true)]
-    #[arg(allow_negative_numbers = true)]
+    #[arg(allow_hyphen_values = true)]
     numerator: Vec<f64>,
     /// Coefficients of the denominator, highest power of s first
     #[arg(long, value_name = "LIST", value_delimiter = ',', required = true)]
-    #[arg(allow_negative_numbers = true)]
+    #[arg(allow_hyphen_values = true)]
     denominator: Vec<f64>,
     /// Delay, s
     #[arg(long, value_name = "S", default_value_t = 0.0)]

@@ -73,7 +73,7 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = Jet::Off)]
     nozzle_jet: Jet,
     /// Prints the poles at COUNT thrusts from FROM to TO as CSV instead
-    #[arg(long, value_name = "FROM:TO:COUNT")]
+    #[arg(long, value_name = "FROM:TO:COUNT", allow_hyphen_values = true)]
     sweep: Option<String>,
     /// Runs a campaign of so many cases around the pair instead
     #[arg(long, value_name = "N", requires = "output", conflicts_with = "sweep",
@@ -184,6 +184,7 @@ fn poles(planar: &Planar) -> Result<[Complex<f64>; 4], Error> {
 }
 
 fn print(planar: &Planar, out: &mut dyn Write) -> Result<(), Error> {
+    let poles = poles(planar)?;
     let [a0, a1, a2, a3, a4] = planar.quartic().map(number);
     writeln!(out, "quartic a4 … a0                {a4}  {a3}  {a2}  {a1}  {a0}")?;
     let column = match planar.routh_column() {
@@ -220,7 +221,7 @@ fn print(planar: &Planar, out: &mut dyn Write) -> Result<(), Error> {
         "\n{:>20}{:>20}{:>20}{:>20}",
         "Re s, rad/s", "Im s, rad/s", "|Im s|/2π, Hz", "damping ratio"
     )?;
-    for pole in poles(planar)? {
+    for pole in poles {
         let hertz = pole.im.abs() / std::f64::consts::TAU;
         let cells = [pole.re, pole.im, hertz, -pole.re / pole.norm()].map(number);
         writeln!(out, "{:>20}{:>20}{:>20}{:>20}", cells[0], cells[1], cells[2], cells[3])?;
@@ -327,6 +328,19 @@ mod tests {
         assert_eq!((rows[1][0], rows[1][1]), ("0", "true"));
         assert_eq!((rows[3][0], rows[3][1]), ("1", "false"));
         assert!(output(&[&PAIR[..], &["--sweep", "0:1"]].concat()).is_err());
+    }
+
+    #[test]
+    fn poles_that_numbers_cannot_hold_are_wrong_usage_and_nothing_is_printed() {
+        for (place, value) in [(15, "--thrust=1e300"), (2, "1e308"), (6, "1e200")] {
+            let mut arguments = PAIR;
+            arguments[place] = value;
+            let command = Command::try_parse_from(arguments).unwrap();
+            let mut out = Vec::new();
+            let error = run(&command.args, &mut out).unwrap_err();
+            assert_eq!(error.code(), crate::cli::USAGE, "{value}");
+            assert!(out.is_empty(), "{value}");
+        }
     }
 
     #[test]

@@ -63,7 +63,8 @@ pub fn pages() -> Vec<(String, String)> {
         })
         .collect();
     let gates = gate::report_schema().as_value().clone();
-    let about = "What `tvse gate` and `tvse run --gates` write: `gates.json` in the run's folder.";
+    let about = "What `tvse gate` and `tvse run --gates` write: `gates.json` in the run's folder, `baseline_gates.json` where a \
+                 baseline run was compared with.";
     pages.push(("outcomes.md".to_owned(), reference::keys("Outcomes of gates", about, &gates)));
     let all = columns::columns();
     let rows = all.iter().map(|c| [c.table, &c.name, c.type_name, &c.unit, &c.description]);

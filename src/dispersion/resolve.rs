@@ -489,7 +489,7 @@ fn check_bearing(
     parameters: &Parameters,
     at: &mut dyn FnMut(&str, String, String),
 ) {
-    if quantity != Quantity::BearingStiffness {
+    if !matches!(quantity, Quantity::BearingStiffness | Quantity::BearingDamping) {
         return;
     }
     let included: Vec<&str> = targets
@@ -506,7 +506,7 @@ fn check_bearing(
         .collect();
     if !included.is_empty() {
         let allowed = "bearings of engines with an actuator whose bearing is \"separate\"; \
-                       an included one is part of the actuator stiffness";
+                       an included one is part of the actuator's stiffness and damping";
         at("path", format!("the included bearing of {}", included.join(", ")), allowed.into());
     }
 }

@@ -43,13 +43,23 @@ impl AerodynamicPlant {
         drawn.dynamic_pressure_pa * self.area_m2 * drawn.axial_force
     }
 
+    /// Whether the rigid motion acts by the angle of attack and its rates alone, not by a generalised matrix.
+    pub fn feels_attack_alone(&self, layout: &Layout) -> bool {
+        let rigid = |entry: &Entry| {
+            layout.translation().contains(&entry.column)
+                || layout.rotation().contains(&entry.column)
+        };
+        !self.entries.iter().any(rigid)
+    }
+
     /// Adds forces and moments, scaled by `factor`, to the model.
     ///
-    /// The body's transverse velocity relative to the air at the centre of pressure, `x_cp` aft of the
-    /// reference, is `w_y = ξ̇_y + V θ_z + x_cp θ̇_z` and `w_z = ξ̇_z − V θ_y − x_cp θ̇_y`; the normal
-    /// force is `−q S C_Nα w/V` there. The axial force `A = q S C_A x̂` turns with the body: `θ × A` on the
-    /// translation. Damping moments are `q S D²/(2V) C_mq θ̇` in pitch and yaw
-    /// and the same with C_lp in roll (coefficients negative where they damp).
+    /// The angle of attack is that of the reference (its cg), `α_y = θ_z + ξ̇_y/V` and `α_z = −θ_y + ξ̇_z/V`;
+    /// the normal force is `−q S C_Nα α` at the centre of pressure. The axial force `A = q S C_A x̂` turns with
+    /// the body: `θ × A` on the translation. Moments of rates are `q S D²/(2V) C_mq θ̇` in pitch and yaw
+    /// and the same with C_lp in roll (coefficients negative where they damp): C_mq is the whole
+    /// derivative of the moment about the reference, the normal force of the rate at the centre of pressure
+    /// included (Etkin and Reid, Dynamics of Flight, 3rd edition, 5.4).
     pub fn add(&self, drawn: &DrawnAerodynamics, factor: f64, layout: &Layout, model: &mut Model) {
         let pressure = factor * drawn.dynamic_pressure_pa;
         for entry in &self.entries {
@@ -70,7 +80,6 @@ impl AerodynamicPlant {
             for (row, lever) in [(force, 1.0), (angle, sign * arm)] {
                 model.stiffness[(row, angle)] += lever * normal * sign;
                 model.damping[(row, force)] += lever * normal / self.speed_m_s;
-                model.damping[(row, angle)] += lever * normal * sign * arm / self.speed_m_s;
             }
         }
         let axial = Vector3::x() * (factor * self.drag_n(drawn));
@@ -112,13 +121,11 @@ impl AerodynamicPlant {
             for (axis, turn, sign) in [(1, 2, 1.0), (2, 1, -1.0)] {
                 let (force, angle) = (translation.start + axis, rotation.start + turn);
                 let felt = left[force] + left[angle] * (sign * arm);
-                let rate = s / self.speed_m_s;
-                let flow =
-                    right[angle] * sign + rate * (right[force] + right[angle] * (sign * arm));
-                let product = felt * flow;
+                let attack = right[angle] * sign + right[force] * (s / self.speed_m_s);
+                let product = felt * attack;
                 per_pressure += product * slope;
                 to.normal_force_slope_1_rad += product * (pressure * self.area_m2);
-                let by_arm = left[angle] * flow + felt * rate * right[angle];
+                let by_arm = left[angle] * attack;
                 to.center_of_pressure_x_m += by_arm * (pressure * slope * sign);
             }
             let part = |z: &[C], range: &std::ops::Range<usize>| {

@@ -7,7 +7,7 @@ use super::aerodynamics::AerodynamicPlant;
 use super::attached::Columns;
 use super::drawn::DrawnVehicle;
 use super::engine::Attachment;
-use super::rigid_body::{self, Flow};
+use super::rigid_body::{self, Flow, Steady};
 use super::slosh::TankAttachment;
 use super::{Layout, Model, Servo};
 use crate::vehicle::MassProperties;
@@ -153,10 +153,15 @@ impl Plant {
         if let Some(servo) = self.servo.as_ref().filter(|servo| servo.is_active()) {
             servo.attach(&servo.compose(drawn), drawn, effects.feedback, layout, model);
         }
+        let sensed = rigid_body::sensed(layout, &still, model);
+        let mut speed_m_s = None;
         if let (Some(plant), Some(air)) = (&self.aerodynamics, &drawn.aerodynamics) {
             plant.add(air, effects.aerodynamics, layout, model);
+            speed_m_s = plant.feels_attack_alone(layout).then_some(plant.speed_m_s);
         }
-        rigid_body::find_null_states(layout, &still, self.flow(drawn, effects), model);
+        let flow = self.flow(drawn, effects);
+        let steady = Steady { before: &still, sensed: &sensed, flow, acceleration, speed_m_s };
+        rigid_body::find_null_states(layout, &steady, model);
     }
 }
 

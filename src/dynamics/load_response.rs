@@ -18,15 +18,16 @@ pub struct NozzleOnActuator {
 impl NozzleOnActuator {
     /// A nozzle of inertia `inertia_kg_m2` about its pivot on `actuator`, with the bearing of `engine`.
     pub fn new(engine: &Engine, actuator: &Actuator, inertia_kg_m2: f64) -> Self {
-        let separate = actuator.bearing == Bearing::Separate;
+        let [bearing_stiffness_n_m_rad, bearing_damping_n_m_s_rad] = match actuator.bearing {
+            Bearing::Included => [0.0; 2],
+            Bearing::Separate => {
+                [engine.bearing_stiffness_n_m_rad, engine.bearing_damping_n_m_s_rad]
+            }
+        };
         Self {
             inertia_kg_m2,
-            bearing_stiffness_n_m_rad: if separate {
-                engine.bearing_stiffness_n_m_rad
-            } else {
-                0.0
-            },
-            bearing_damping_n_m_s_rad: engine.bearing_damping_n_m_s_rad,
+            bearing_stiffness_n_m_rad,
+            bearing_damping_n_m_s_rad,
             torque: actuator.law.state_space(),
         }
     }

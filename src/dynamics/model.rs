@@ -25,15 +25,18 @@ pub struct Model {
     /// A motion at no cost that is no single state: its null state and the components of the other
     /// states per unit of that one. The state matrix is that of the states less this motion.
     pub null_motion: Option<NullMotion>,
+    /// Most poles at the origin that the equations may have beside the null states: integrators that
+    /// nothing drives, rotations that nothing holds. Beyond these, a pole lost in the rounding is an error.
+    pub at_origin: usize,
 }
 
 /// See [`Model::null_motion`].
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct NullMotion {
-    /// The null state left out, one of [`Model::null_states`].
+    /// The null state left out, one of [`Model::null_states`]: a rotation, whose rate is kept, or a rate.
     pub state: usize,
-    /// Two other states and their components per unit of the one left out.
-    pub others: [(usize, f64); 2],
+    /// Other states and their components per unit of the one left out.
+    pub others: Vec<(usize, f64)>,
 }
 
 impl Model {
@@ -47,6 +50,7 @@ impl Model {
             second_order: coordinates,
             null_states: Vec::new(),
             null_motion: None,
+            at_origin: 0,
         }
     }
 
@@ -76,6 +80,7 @@ impl Model {
         self.second_order = second_order;
         self.null_states.clear();
         self.null_motion = None;
+        self.at_origin = 0;
         for state in second_order..self.coordinates() {
             self.damping[(state, state)] = 1.0;
         }
@@ -88,7 +93,8 @@ impl Model {
         })
     }
 
-    /// Sets this model to `(1 − t) a + t b`, two models of one layout. Null states are those of both.
+    /// Sets this model to `(1 − t) a + t b`, two models of one layout. Null states are those of both; a
+    /// motion that is not the same in both is kept and may leave its pole at the origin.
     pub fn blend(&mut self, a: &Self, b: &Self, t: f64) {
         let pairs = [
             (&mut self.mass, &a.mass, &b.mass),
@@ -104,11 +110,14 @@ impl Model {
         }
         self.second_order = a.second_order;
         self.null_states.clear();
-        let motions = [a, b].map(|model| model.null_motion);
-        self.null_motion = if motions[0] == motions[1] { motions[0] } else { None };
+        let motions = [&a.null_motion, &b.null_motion];
+        self.null_motion = if motions[0] == motions[1] { motions[0].clone() } else { None };
         let motion = |state: &usize| {
-            self.null_motion.is_none() && motions.iter().flatten().any(|m| m.state == *state)
+            self.null_motion.is_none()
+                && motions.iter().copied().flatten().any(|motion| motion.state == *state)
         };
+        let kept = usize::from(motions[0] != motions[1]);
+        self.at_origin = a.at_origin.max(b.at_origin) + kept;
         let both = a.null_states.iter().filter(|s| b.null_states.contains(s) && !motion(s));
         self.null_states.extend(both);
     }

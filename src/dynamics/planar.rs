@@ -271,7 +271,8 @@ impl Planar {
     }
 
     /// The four poles, rad/s, by ascending |Im s| and then Re s; conjugate pairs have the pole
-    /// above the axis first. `None` if the iteration does not converge.
+    /// above the axis first. `None` if the iteration does not converge, or where the poles are so far apart
+    /// that half of the digits of their product are lost.
     pub fn poles(&self) -> Option<[Complex<f64>; 4]> {
         let a = self.quartic();
         // In t = s/σ the product of the roots is one: a companion matrix without large entries.
@@ -292,14 +293,19 @@ impl Planar {
             }
             None => eigenvalues(&monic)?,
         };
-        let mut poles = start;
+        let mut roots = start;
         for i in 0..4 {
-            poles[i] = if i > 0 && start[i] == start[i - 1].conj() {
-                poles[i - 1].conj()
+            roots[i] = if i > 0 && start[i] == start[i - 1].conj() {
+                roots[i - 1].conj()
             } else {
-                polish(&monic, start[i]) * sigma
+                polish(&monic, start[i])
             };
         }
+        let product: f64 = roots.iter().map(|t| t.norm()).product();
+        if !((product - 1.0).abs() <= f64::EPSILON.sqrt()) {
+            return None;
+        }
+        let mut poles = roots.map(|t| t * sigma);
         let key = |p: &Complex<f64>| (p.im.abs(), p.re, -p.im);
         poles.sort_by(|x, y| {
             let ((x0, x1, x2), (y0, y1, y2)) = (key(x), key(y));

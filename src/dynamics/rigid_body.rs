@@ -3,7 +3,8 @@
 //! Attached masses add theirs in `engine` and `slosh`. The null chain: no force depends on where the
 //! vehicle is, so every ξ is null, and its rate too unless the air is felt. A vehicle turned by θ
 //! that accelerates along its turned thrust, `ξ̈ = −g0 × θ`, is in equilibrium; so θ acts on ξ alone and
-//! is null as well, and its rate too unless flow or air damps it.
+//! is null as well, and its rate too unless flow or air damps it. Where the air is felt, only a turn about
+//! g0 needs no acceleration, and costs nothing with the velocity that keeps the angle of attack.
 
 use super::gradient::{C, Vectors};
 use super::{DrawnBody, Layout, Model, NullMotion};
@@ -85,16 +86,40 @@ pub fn attitude_columns(layout: &Layout, model: &Model) -> Vec<Vec<f64>> {
     layout.rotation().map(column).collect()
 }
 
-/// Writes the null states of the assembled model. `before` are the columns of θ from
-/// [`attitude_columns`]: a rotation is null where nothing was added to its column since; `flow` is what
-/// damps rotations.
+/// Whether each rotation is sensed: something was added to its column since `before`, see
+/// [`attitude_columns`].
+pub fn sensed(layout: &Layout, before: &[Vec<f64>], model: &Model) -> Vec<bool> {
+    let differs = |at: usize, before: &[f64]| {
+        model.stiffness.col(at).iter().zip(before).any(|(now, before)| now != before)
+    };
+    layout.rotation().zip(before).map(|(at, before)| differs(at, before)).collect()
+}
+
+/// What decides which turns of the vehicle cost nothing.
+#[derive(Debug, Clone, Copy)]
+pub struct Steady<'a> {
+    /// Columns of θ from [`attitude_columns`].
+    pub before: &'a [Vec<f64>],
+    /// Which rotations the autopilot senses, from [`sensed`].
+    pub sensed: &'a [bool],
+    /// What damps rotations.
+    pub flow: Flow,
+    /// Mean acceleration g0, m/s².
+    pub acceleration: Vector3<f64>,
+    /// Speed at which the air feels the angle of attack and nothing else, m/s.
+    pub speed_m_s: Option<f64>,
+}
+
+/// Writes the null states of the assembled model: a rotation is null where nothing was added to its
+/// column, and where the air feels ξ̇ only about g0. There the turn r ∥ g0 needs no acceleration, and with
+/// `ξ̇ = −V r × x̂` the angle of attack stays: one motion for the poles, see [`Model::null_motion`].
 ///
 /// No magnitude is compared: a state is null by the structure of the equations, or exactly unused.
-pub fn find_null_states(layout: &Layout, before: &[Vec<f64>], flow: Flow, model: &mut Model) {
+pub fn find_null_states(layout: &Layout, steady: &Steady<'_>, model: &mut Model) {
     if layout.rotation().is_empty() {
         return;
     }
-    let second_order = layout.second_order();
+    let (second_order, g0) = (layout.second_order(), steady.acceleration);
     let undamped = |at: usize| model.damping.col(at).iter().all(|value| *value == 0.0);
     let mut positions = Vec::new();
     let mut rates = Vec::new();
@@ -104,19 +129,35 @@ pub fn find_null_states(layout: &Layout, before: &[Vec<f64>], flow: Flow, model:
             rates.push(second_order + at);
         }
     }
-    for (at, before) in layout.rotation().zip(before) {
-        if model.stiffness.col(at).iter().zip(before).all(|(now, before)| now == before) {
+    let felt = rates.len() < layout.translation().len();
+    let used = sensed(layout, steady.before, model);
+    for (axis, at) in layout.rotation().enumerate() {
+        let alone = g0.cross(&Vector3::ith(axis, 1.0)) == Vector3::zeros();
+        if !used[axis] && (!felt || alone) {
             positions.push(at);
             if undamped(at) {
                 rates.push(second_order + at);
             }
         }
     }
+    let most = g0.iamax();
+    let state = layout.rotation().start + most;
+    let about = (0..3).all(|axis| g0[axis] == 0.0 || !steady.sensed[axis]);
+    let wind = steady.speed_m_s.filter(|_| felt && about && g0[most] != 0.0);
+    if let (Some(speed), false) = (wind, positions.contains(&state)) {
+        let turn = g0 / g0[most];
+        let drift = turn.cross(&Vector3::x()) * -speed;
+        let turns = layout.rotation().zip(turn.iter().copied()).filter(|(at, _)| *at != state);
+        let drifts = layout.translation().map(|at| second_order + at).zip(drift.iter().copied());
+        let others = turns.chain(drifts).filter(|(_, part)| *part != 0.0).collect();
+        positions.push(state);
+        model.null_motion = Some(NullMotion { state, others });
+    }
     // All rotations free and some damped: the rotation about a common direction of flow is not.
     let turning = layout.rotation().map(|at| second_order + at);
     let free = layout.rotation().all(|at| positions.contains(&at));
-    if let (Flow::Along(axis), true) = (flow, free && turning.clone().all(|s| !rates.contains(&s)))
-    {
+    let damped = turning.clone().all(|state| !rates.contains(&state));
+    if let (Flow::Along(axis), true) = (steady.flow, free && damped) {
         let most = axis.iamax();
         let state = second_order + layout.rotation().start + most;
         let others = [(most + 1) % 3, (most + 2) % 3].map(|other| {
@@ -124,8 +165,14 @@ pub fn find_null_states(layout: &Layout, before: &[Vec<f64>], flow: Flow, model:
         });
         rates.push(state);
         rates.sort_unstable();
-        model.null_motion = Some(NullMotion { state, others });
+        model.null_motion = Some(NullMotion { state, others: others.to_vec() });
     }
+    // A turn and its rate are at the origin as well where what senses it moves nothing, or nothing turns the
+    // vehicle back: those not left out may be.
+    let turns = layout.rotation().filter(|at| positions.contains(at)).count();
+    let left_out = turns + turning.filter(|state| rates.contains(state)).count();
+    model.at_origin += 2 * layout.rotation().len() - left_out;
+    positions.sort_unstable();
     model.null_states.clear();
     model.null_states.extend(positions.into_iter().chain(rates));
 }

@@ -72,6 +72,8 @@ pub struct Servo {
     /// Nominal slopes of the modes at the grid of each sensor: sensors, then modes, rad/m per kg^1/2.
     slopes: Vec<Vec<Vector3<f64>>>,
     active: bool,
+    /// Poles at the origin that the parts have each on its own.
+    at_origin: usize,
 }
 
 /// The servo part in the form of [`super::gradient`].
@@ -167,7 +169,19 @@ impl Servo {
             _ => true,
         });
         let autopilot = vehicle.autopilot.as_ref();
+        let at_origin = sources.iter().map(|source| match source {
+            Source::Actuator(engine, set, axis) => {
+                vehicle.engines[*engine].actuator(2 * set + axis).law.poles_at_origin()
+            }
+            Source::Path(path, _) => {
+                let filters = autopilot.into_iter().flat_map(|a| &a.paths[*path].filters);
+                filters.map(|filter| filter.kind.poles_at_origin()).sum()
+            }
+            Source::Fixed(_) | Source::Axis(_) => 0,
+        });
+        let at_origin = at_origin.sum();
         let servo = Self {
+            at_origin,
             connection,
             sources,
             signals,
@@ -349,6 +363,7 @@ impl Servo {
         layout: &Layout,
         model: &mut Model,
     ) {
+        model.at_origin += self.at_origin;
         let first = layout.first_order().start;
         let states = composite.order();
         let rows: Vec<Option<usize>> = self.torques.iter().map(|&t| gimbal(layout, t)).collect();

@@ -54,6 +54,8 @@ pub struct Mode {
     pub frequency_hz: f64,
     /// Generalised mass of the shape as it stands, kg, where the file gives it.
     pub generalised_kg: Option<f64>,
+    /// Greatest component of a translation along the displacement axes of the file, in its scale.
+    pub greatest: f64,
     /// Translation at each grid.
     pub shape: Vec<Vector3<f64>>,
     /// Rotation at each grid, per metre; zero where the file has none.
@@ -189,6 +191,9 @@ impl Model {
         });
         let mut modes: Vec<Mode> = (results.modes.into_iter())
             .map(|mode| {
+                let translations = kept.iter().map(|&place| mode.shape[place].translation);
+                let components = translations.flatten().map(f64::abs);
+                let greatest = components.fold(0.0, f64::max);
                 let (shape, slope) = (kept.iter().zip(&axes))
                     .map(|(&place, axes)| {
                         let at = &mode.shape[place];
@@ -201,6 +206,7 @@ impl Model {
                     number: mode.number,
                     frequency_hz: mode.frequency_hz,
                     generalised_kg: mode.generalised_mass.map(|m| m * units.mass_kg),
+                    greatest,
                     shape,
                     slope,
                 }

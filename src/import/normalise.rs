@@ -4,7 +4,6 @@
 
 use super::model::Model;
 use crate::fem::Results;
-use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -129,7 +128,7 @@ pub fn generalised(
         if lumped.as_ref().is_some_and(off) {
             apart.push(mode.number);
         }
-        let greatest = mode.shape.iter().map(Vector3::amax).fold(0.0, f64::max);
+        let greatest = mode.greatest;
         if normalisation == Normalisation::Maximum && !(greatest <= 1.0 + UNIT) {
             faults.push(format!(
                 "a translation of {greatest:.5} in mode {}, where normalisation = \

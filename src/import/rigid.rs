@@ -322,6 +322,7 @@ mod tests {
                 number: i as i64 + 1,
                 frequency_hz,
                 generalised_kg: None,
+                greatest: 1.0,
                 slope: vec![Vector3::zeros(); shape.len()],
                 shape,
             })

@@ -11,6 +11,7 @@ use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderB
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
+use parquet::file::metadata::ParquetMetaData;
 use parquet::file::properties::WriterProperties;
 use parquet::schema::types::ColumnPath;
 use std::collections::BTreeMap;
@@ -224,6 +225,7 @@ impl Table {
         )
         .map_err(|e| damage(&e))?;
         let metadata = builder.metadata().clone();
+        readable(&metadata, file)?;
         let rows = metadata.file_metadata().num_rows();
         let size = (metadata.row_groups().iter())
             .try_fold(0_i64, |sum, group| sum.checked_add(group.total_byte_size()));
@@ -288,6 +290,22 @@ impl Table {
     }
 }
 
+/// Whether every column is compressed in a way that can be undone.
+///
+/// # Errors
+/// Wrong input with the name of the codec.
+pub fn readable(metadata: &ParquetMetaData, file: &str) -> Result<(), Problems> {
+    let mut columns = metadata.row_groups().iter().flat_map(|group| group.columns());
+    match columns.find(|column| column.compression() == Compression::LZO) {
+        None => Ok(()),
+        Some(column) => {
+            let found = format!("a column compressed by {}", column.compression());
+            let allowed = "zstd, Snappy, gzip, Brotli, LZ4 or no compression";
+            Err(Problems::input(file, column.column_path().string(), found, allowed))
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -314,6 +332,46 @@ mod tests {
         let bytes = table().to_bytes(&LAYOUT).unwrap();
         assert_eq!(bytes, table().to_bytes(&LAYOUT).unwrap());
         assert_eq!(Table::from_bytes(&LAYOUT, bytes, "t").unwrap(), table());
+    }
+
+    #[test]
+    fn a_table_is_read_whatever_the_codec_and_one_that_cannot_be_undone_is_named() {
+        use parquet::arrow::arrow_reader::ArrowReaderMetadata;
+        let bytes = bytes::Bytes::from(table().to_bytes(&LAYOUT).unwrap());
+        let batches = || {
+            let builder = ParquetRecordBatchReaderBuilder::try_new(bytes.clone()).unwrap();
+            builder.build().unwrap().map(Result::unwrap)
+        };
+        for codec in [
+            Compression::UNCOMPRESSED,
+            Compression::SNAPPY,
+            Compression::GZIP(Default::default()),
+            Compression::BROTLI(Default::default()),
+            Compression::ZSTD(Default::default()),
+            Compression::LZ4,
+            Compression::LZ4_RAW,
+        ] {
+            let properties = WriterProperties::builder().set_compression(codec).build();
+            let schema = batches().next().unwrap().schema();
+            let mut writer = ArrowWriter::try_new(Vec::new(), schema, Some(properties)).unwrap();
+            batches().for_each(|batch| writer.write(&batch).unwrap());
+            let written = writer.into_inner().unwrap();
+            assert_eq!(Table::from_bytes(&LAYOUT, written, "t").unwrap(), table(), "{codec}");
+        }
+        let footer = ArrowReaderMetadata::load(&bytes, ArrowReaderOptions::new()).unwrap();
+        assert_eq!(readable(footer.metadata(), "t"), Ok(()));
+        let mut whole = ParquetMetaData::clone(footer.metadata()).into_builder();
+        for group in whole.take_row_groups() {
+            let mut group = group.into_builder();
+            for column in group.take_columns() {
+                let packed = column.into_builder().set_compression(Compression::LZO);
+                group = group.add_column_metadata(packed.build().unwrap());
+            }
+            whole = whole.add_row_group(group.build().unwrap());
+        }
+        let refused = readable(&whole.build(), "t").unwrap_err();
+        assert_eq!(refused.0[0].kind, Kind::Input);
+        assert!(refused.to_string().contains("compressed by LZO"), "{refused}");
     }
 
     #[test]

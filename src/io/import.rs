@@ -240,6 +240,7 @@ fn columns(bytes: Vec<u8>, name: &str) -> Result<(Columns, Precision), Problems>
     let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(bytes, options)
         .map_err(|e| damage(name, e))?;
     let metadata = builder.metadata().clone();
+    super::flat::readable(&metadata, name)?;
     let rows = metadata.file_metadata().num_rows();
     let size = (metadata.row_groups().iter())
         .try_fold(0_i64, |sum, group| sum.checked_add(group.total_byte_size()));

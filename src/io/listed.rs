@@ -138,9 +138,9 @@ fn csv(bytes: &[u8], file: &str, problems: &mut Problems) -> Result<Vec<Column>,
 /// Reads Parquet: columns of numbers.
 fn parquet(bytes: Vec<u8>, file: &str, problems: &mut Problems) -> Result<Vec<Column>, Problems> {
     // The Parquet reader panics on some malformed files instead of returning an error.
-    let decoded = catch_unwind(AssertUnwindSafe(|| decode(bytes)));
-    let decoded = decoded.unwrap_or_else(|_| Err("a malformed Parquet file".to_owned()));
-    let all = decoded.map_err(|found| Problems::damage(file, "", found, "a whole Parquet file"))?;
+    let decoded = catch_unwind(AssertUnwindSafe(|| decode(bytes, file)));
+    let malformed = || damage(file, "a malformed Parquet file".to_owned());
+    let all = decoded.unwrap_or_else(|_| Err(malformed()))?;
     let mut columns = Vec::new();
     for (name, values) in all {
         let Ok(values) = values else {
@@ -156,23 +156,28 @@ fn parquet(bytes: Vec<u8>, file: &str, problems: &mut Problems) -> Result<Vec<Co
     Ok(columns)
 }
 
+fn damage(file: &str, found: String) -> Problems {
+    Problems::damage(file, "", found, "a whole Parquet file")
+}
+
 type Decoded = Vec<(String, Result<Vec<f64>, ()>)>;
 
 /// Names and numbers of a Parquet file; NaN for NULL, no numbers for a column of something else.
-fn decode(bytes: Vec<u8>) -> Result<Decoded, String> {
-    let text = |error: parquet::errors::ParquetError| error.to_string();
+fn decode(bytes: Vec<u8>, file: &str) -> Result<Decoded, Problems> {
+    let text = |error: parquet::errors::ParquetError| damage(file, error.to_string());
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let bytes = bytes::Bytes::from(bytes);
     let builder =
         ParquetRecordBatchReaderBuilder::try_new_with_options(bytes, options).map_err(text)?;
+    super::flat::readable(builder.metadata(), file)?;
     let rows = builder.metadata().file_metadata().num_rows();
     if !(0..=MOST_CASES as i64).contains(&rows) {
-        return Err(format!("{rows} rows, beyond {MOST_CASES}"));
+        return Err(damage(file, format!("{rows} rows, beyond {MOST_CASES}")));
     }
     let fields = builder.schema().fields().iter();
     let mut columns: Decoded = fields.map(|f| (f.name().clone(), Ok(Vec::new()))).collect();
     for batch in builder.build().map_err(text)? {
-        let batch = batch.map_err(|error| error.to_string())?;
+        let batch = batch.map_err(|error| damage(file, error.to_string()))?;
         for ((_, values), array) in columns.iter_mut().zip(batch.columns()) {
             let numbers = if array.data_type().is_numeric() {
                 arrow::compute::cast(array, &DataType::Float64).ok()

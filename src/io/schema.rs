@@ -330,7 +330,7 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
         ),
         Column::count(
             "null_poles",
-            "Poles at the origin of this model, known by construction and not solved for",
+            "Poles at the origin of this model, as many as its equations may have, left out of the poles",
             |r: &ModeRow| Some(r.null_poles as i64),
         ),
         Column::text(

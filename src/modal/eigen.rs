@@ -125,7 +125,8 @@ impl Solver {
 
     /// All poles of the model, rad/s, appended to `poles` (cleared first) with each complex pair
     /// represented by its member in the upper half plane; sorted by imaginary, then real part. The
-    /// null states of the model are no part of them: each is one more pole, at the origin.
+    /// null states of the model are no part of them: each is one more pole, at the origin. Nor are as many
+    /// as [`Model::at_origin`] that rounding does not tell from zero.
     ///
     /// # Errors
     /// See [`Error`]; poles are checked against the traces of the state matrix and its square.
@@ -170,13 +171,13 @@ impl Solver {
             }
         }
         // The error of a pole is a modest multiple of n ε times the greatest one.
-        let moduli = || all().map(|s| s.norm());
-        let (least, greatest) =
-            moduli().fold((f64::INFINITY, 0.0_f64), |(a, b), s| (a.min(s), b.max(s)));
-        if !(least >= bound * greatest) {
+        let greatest = all().map(|s| s.norm()).fold(0.0, f64::max);
+        let told = |s: &c64| s.norm() >= bound * greatest;
+        if all().filter(|s| !told(s)).count() > model.at_origin {
+            let least = all().map(|s| s.norm()).fold(f64::INFINITY, f64::min);
             return Err(Error::Spread { least, greatest });
         }
-        poles.extend(all().filter(|s| s.im >= 0.0));
+        poles.extend(all().filter(|s| s.im >= 0.0 && told(s)));
         poles.sort_by(|a, b| a.im.total_cmp(&b.im).then(a.re.total_cmp(&b.re)));
         Ok(())
     }
@@ -293,12 +294,16 @@ impl Solver {
             }
         }
         // Less the null motion v: of z = z̃ + v z_j/v_j only z̃ acts, and z̃_i = z_i − v_i z_j/v_j changes.
-        let motion = model.null_motion.iter();
-        for (other, ratio) in motion.flat_map(|motion| motion.others) {
-            let left_out = model.null_motion.map_or(0, |motion| motion.state);
+        let Some(motion) = &model.null_motion else { return Ok(()) };
+        for &(other, ratio) in &motion.others {
             let Some(row) = self.kept.iter().position(|state| *state == other) else { continue };
             for (column, &from) in self.kept.iter().enumerate() {
-                self.state[(row, column)] += ratio * right_side[(left_out - n, from)];
+                // The row of the state left out: of a position, its rate.
+                let rate = match motion.state.checked_sub(n) {
+                    Some(acceleration) => -right_side[(acceleration, from)],
+                    None => f64::from(u8::from(from == n + motion.state)),
+                };
+                self.state[(row, column)] -= ratio * rate;
             }
         }
         Ok(())

@@ -141,7 +141,10 @@ impl Reference {
                     if rate { (s * right, mass) } else { (right, s * mass + damping) };
                 if let Some(motion) = &model.null_motion {
                     let ratio = motion.others.iter().find(|(other, _)| *other == state);
-                    let left_out = s * self.pair.right[motion.state - n];
+                    let left_out = match motion.state.checked_sub(n) {
+                        Some(at) => s * self.pair.right[at],
+                        None => self.pair.right[motion.state],
+                    };
                     right -= ratio.map_or(0.0, |(_, ratio)| *ratio) * left_out;
                 }
                 (right, (left * scale).conj())
@@ -502,5 +505,12 @@ mod tests {
         assert!(matches!(solver.poles(&huge, &mut poles), Err(Error::Spread { .. })));
         huge.stiffness[(2, 2)] = 1e12;
         assert_eq!(solver.poles(&huge, &mut poles), Ok(()));
+        // A pole at the origin is one only where the equations may have it.
+        let mut free = model([1.0, 1.1], 0.0, 0.0);
+        free.stiffness[(1, 1)] = 0.0;
+        assert!(matches!(solver.poles(&free, &mut poles), Err(Error::Spread { .. })));
+        free.at_origin = 1;
+        assert_eq!(solver.poles(&free, &mut poles), Ok(()));
+        assert_eq!(poles.len(), 3);
     }
 }

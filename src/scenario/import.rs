@@ -28,7 +28,7 @@ use std::collections::BTreeSet;
 /// Cosine of the angle between the given `aft` and `y` above which they are refused.
 const SKEW: f64 = 1e-4;
 /// Ratio of a declared mass to that of the files beyond which it is a slip of units.
-const MASS_SLIP: f64 = 10.0;
+const MASS_SLIP: f64 = 30.0;
 /// Departure of a declared mass from that of the files above which it is reported.
 const MASS_APART: f64 = 0.02;
 /// Agreement of the grids' masses with the body's above which they must weigh the modes too.

@@ -101,12 +101,13 @@ pub struct AerodynamicsFile {
     pub speed_m_s: Vec<f64>,
     /// Slope of the normal force coefficient at each time, 1/rad.
     pub normal_force_slope_1_rad: Vec<f64>,
-    /// Station of the centre of pressure at each time, m.
+    /// Station of the centre of pressure at each time, m: where the normal force of the angle of attack
+    /// of the vehicle's cg acts.
     pub center_of_pressure_x_m: Vec<f64>,
     /// Axial force coefficient at each time.
     pub axial_force: Vec<f64>,
-    /// Damping coefficient in pitch and yaw at each time (moment per q S D and θ̇ D/2V), negative
-    /// where it damps.
+    /// Damping coefficient C_mq in pitch and yaw at each time (moment about the cg per q S D and θ̇ D/2V),
+    /// negative where it damps: the whole rate derivative; nothing is added for the centre of pressure.
     pub pitch_damping: Vec<f64>,
     /// Damping coefficient in roll at each time, negative where it damps.
     pub roll_damping: Vec<f64>,
@@ -297,7 +298,7 @@ pub struct ActuatorFile {
     pub transfer_function: Option<TransferFunctionFile>,
     /// Matrices of an actuator in state space.
     pub state_space: Option<StateSpaceFile>,
-    /// Whether the flex bearing is part of the actuator's stiffness (default: included for
+    /// Whether stiffness and damping of the flex bearing are part of the actuator's (default: included for
     /// second-order, separate for electrohydraulic).
     pub bearing: Option<BearingPart>,
 }

@@ -13,12 +13,12 @@ pub use transfer_function::TransferActuator;
 use super::StateSpace;
 use nalgebra::Vector3;
 
-/// Whether the flex bearing is part of the actuator's stiffness.
+/// Whether the flex bearing is part of the actuator's figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bearing {
-    /// The bearing stiffness is inside the actuator stiffness and is not added.
+    /// Stiffness and damping of the bearing are inside those of the actuator and are not added.
     Included,
-    /// The bearing stiffness acts on the gimbal rotation besides the actuator.
+    /// Stiffness and damping of the bearing act on the gimbal rotation besides the actuator.
     Separate,
 }
 
@@ -46,6 +46,24 @@ impl Law {
         }
     }
 
+    /// Most poles at the origin with the nozzle held; the same for every draw.
+    pub fn poles_at_origin(&self) -> usize {
+        match self {
+            Self::SecondOrder(_) | Self::Electrohydraulic(_) => 0,
+            Self::TransferFunction(law) => {
+                let command = law.command.as_ref().map_or(0, |command| command.poles_at_origin());
+                command + law.stiffness.poles_at_origin()
+            }
+            // Of given matrices the rank tells.
+            Self::StateSpace(law) => {
+                let a = &law.system.a;
+                let values = a.singular_values();
+                let least = a.nrows() as f64 * f64::EPSILON * values.max();
+                values.iter().filter(|value| !(**value > least)).count()
+            }
+        }
+    }
+
     /// Number of states; the same for every draw.
     pub fn order(&self) -> usize {
         self.state_space().order()
@@ -63,7 +81,7 @@ pub struct Actuator {
     pub attach_m: Vector3<f64>,
     /// Unit action line u_b.
     pub action_line: Vector3<f64>,
-    /// Whether the flex bearing is part of the stiffness.
+    /// Whether the flex bearing is part of its figures.
     pub bearing: Bearing,
     /// Torque law.
     pub law: Law,

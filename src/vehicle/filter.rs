@@ -118,6 +118,15 @@ impl FilterKind {
         }
     }
 
+    /// Number of poles at exactly zero; the same for every draw.
+    pub fn poles_at_origin(&self) -> usize {
+        match self {
+            Self::Integrator => 1,
+            Self::Rational(function) => function.poles_at_origin(),
+            _ => 0,
+        }
+    }
+
     /// Exact response at the complex frequency s, rad/s.
     pub fn response(&self, draw: &FilterDraw, s: Complex<f64>) -> Complex<f64> {
         let p = s / draw.frequency;

@@ -74,9 +74,14 @@ impl TransferFunction {
         value(&self.numerator) / value(&self.denominator)
     }
 
+    /// Number of poles at exactly zero.
+    pub fn poles_at_origin(&self) -> usize {
+        self.denominator.iter().rev().take_while(|x| **x == 0.0).count()
+    }
+
     /// Poles, rad/s; those at zero exactly so. `None` where they cannot be found.
     pub fn poles(&self) -> Option<Vec<Complex<f64>>> {
-        let zeros = self.denominator.iter().rev().take_while(|x| **x == 0.0).count();
+        let zeros = self.poles_at_origin();
         let rest = Self::new(&[1.0], &self.denominator[..self.denominator.len() - zeros]).ok()?;
         let mut poles = rest.state_space().poles()?;
         poles.extend(vec![Complex::new(0.0, 0.0); zeros]);

@@ -396,11 +396,13 @@ def assemble(vehicle, time, variant, gimballed, case=None, coupling=1.0, push=1.
                 of = f"{path}.actuator.{actuator['name']}"
                 bearing = engine.get("bearing", {})
                 stiffness = case(f"{of}.stiffness", nominal)
-                if actuator.get("bearing", "included") == "separate":
+                separate = actuator.get("bearing", "included") == "separate"
+                if separate:
                     stiffness += case(f"{path}.bearing.stiffness", bearing["stiffness_n_m_rad"])
                 zeta = case(f"{of}.damping", actuator["damping_ratio"])
                 damping = 2 * zeta * np.sqrt(J_ref * nominal)
-                damping += case(f"{path}.bearing.damping", bearing.get("damping_n_m_s_rad", 0.0))
+                if separate:
+                    damping += case(f"{path}.bearing.damping", bearing.get("damping_n_m_s_rad", 0.0))
                 K.add([theta[axis]], [theta[axis]], Sized(stiffness))
                 D.add([theta[axis]], [theta[axis]], Sized(damping))
         if variant["follower_thrust"]:

@@ -16,7 +16,7 @@ def listed(coefficients):
 
 
 def margins(numerator, denominator, *more):
-    text = tvse("margins", f"--numerator={listed(numerator)}", f"--denominator={listed(denominator)}", *more)
+    text = tvse("margins", "--numerator", listed(numerator), "--denominator", listed(denominator), *more)
     rows = list(csv.DictReader(io.StringIO(text)))
     value = {row["name"]: float(row["value"]) for row in rows}
     omega = {row["name"]: float(row["omega_rad_s"]) for row in rows if row["omega_rad_s"]}

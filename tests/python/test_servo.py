@@ -176,6 +176,73 @@ def test_actuator_responses_are_those_of_python_control(folder, vehicle):
     assert seen == {"second-order", "electrohydraulic", "transfer-function", "state-space"}
 
 
+# ---------------------------------------------------------------- integrators
+
+# Integral action in pitch, as a filter and as a pole at zero of a transfer function.
+INTEGRAL = {
+    "integrator": '{ kind = "integrator" }',
+    "transfer": '{ kind = "transfer-function", numerator = [0.3, 1.0], denominator = [1.0, 0.0] }',
+}
+LOOPS = {
+    "closed": "rigid_body = true\nslosh = true",
+    "air": "rigid_body = true\naerodynamics = true",
+    "held": "rigid_body = false",
+    "coasting": "rigid_body = true\nthrust = false",
+}
+
+
+@pytest.mark.parametrize("kind", INTEGRAL)
+def test_a_loop_with_integral_action_has_the_poles_that_numpy_finds(tmp_path, kind):
+    for inputs in ["vehicles", "dispersions"]:
+        shutil.copytree(ROOT / inputs, tmp_path / inputs)
+    path = tmp_path / "vehicles/sls-like/vehicle.toml"
+    integral = (
+        '[[autopilot.path]]\nname = "integral"\ninput = { "attitude.platform.pitch" = 1.0 }\n'
+        f"gain = 0.02\nfilter = [{INTEGRAL[kind]}]\n\n"
+    )
+    text = path.read_text()
+    named = '[[autopilot.path]]\nname = "pitch"\n'
+    reads = '"path.pitch_attitude" = 1.0 }'
+    assert named in text and reads in text
+    text = text.replace(reads, '"path.pitch_attitude" = 1.0, "path.integral" = 1.0 }')
+    path.write_text(text.replace(named, integral + named))
+    jets = 'case_jet_damping = true\nnozzle_jet_damping = "equation-13"\nfeedback = "closed"'
+    variants = "".join(f'\n[[variant]]\nname = "{n}"\n{jets}\n{v}\n' for n, v in LOOPS.items())
+    (tmp_path / "run.toml").write_text(
+        'vehicle = "vehicles/sls-like"\ndispersion = "dispersions/closed-loop.toml"\ncases = 2\nseed = 7\n'
+        f'flight_times_s = [105.0]\nmodes = ["tvse"]\ngimballed = ["booster.*"]\n'
+        f'[sensitivity]\n[margins]\nvariants = ["closed", "air"]\n{variants}'
+    )
+    tvse("nominal", tmp_path / "run.toml")
+    tvse("run", tmp_path / "run.toml", "-o", tmp_path / "run")
+    if kind == "integrator":
+        tvse("influence", tmp_path / "run", "--variant", "air", "--top", 2)
+        tvse("worst", tmp_path / "run", "--variant", "closed")
+    modes = pd.read_parquet(tmp_path / "run/tables/modes.parquet")
+    assert (modes.status == "ok").all()
+    for case in [0, 1]:
+        words = ["--population", "dispersed", "--case", case]
+        tvse("replay", tmp_path / "run", *words, "-o", tmp_path / f"replay-{case}")
+        replayed = pd.read_parquet(tmp_path / f"replay-{case}/poles.parquet")
+        for variant in LOOPS:
+            target = tmp_path / f"{variant}-{case}"
+            tvse("model", tmp_path / "run.toml", *words, "--variant", variant, "--time", 105, "-o", target)
+            a, _ = scipy.linalg.matrix_balance(Model(target).system.A)
+            theirs = np.linalg.eigvals(a)
+            poles = replayed[replayed.variant == variant]
+            ours = (poles.pole_re_rad_s + 1j * poles.pole_im_rad_s).to_numpy()
+            near = np.abs(ours[:, None] - theirs[None, :]).min(axis=1)
+            # Those of the null chains are found by numpy to the root of the rounding.
+            told = np.abs(ours) > 0.01
+            assert (near[told] <= 1e-7 * (1 + np.abs(ours[told]))).all(), (case, variant)
+            # All poles there are, and the integrator's where the loop is closed around it.
+            missed = np.abs(theirs[theirs.imag >= 0][:, None] - ours[None, :]).min(axis=1)
+            assert (np.abs(theirs[theirs.imag >= 0])[missed > 1e-6] < 0.01).all(), (case, variant)
+            null = modes[(modes.variant == variant) & (modes.population == "dispersed") & (modes.case == case)]
+            solved = (1 + (ours.imag > 0)).sum()
+            assert (null.null_poles + solved == len(a)).all(), (case, variant)
+
+
 # ---------------------------------------------------------------- filters
 
 

@@ -1,7 +1,9 @@
 """Results as pyarrow, pandas, polars and DuckDB read them, and the statistics in them by scipy."""
 
+import json
 import os
 import re
+import shutil
 import subprocess
 import tomllib
 
@@ -244,3 +246,70 @@ def test_options_in_readme_exist():
             for option in re.findall(r"--[a-z-]+", called[2]):
                 assert option in known, line
     assert TVSE.exists()
+
+
+# ------------------------------------------------------------------ codecs
+
+CODECS = ["zstd", "snappy", "gzip", "brotli", "lz4", "uncompressed"]
+IMPORT = """
+units = "SI"
+[frame]
+origin = [0.0, 0.0, 0.0]
+aft = [1.0, 0.0, 0.0]
+y = [0.0, 1.0, 0.0]
+[body]
+kind = "reduced"
+[modes]
+normalisation = "none"
+[[grid]]
+name = "one"
+node = 1
+[[flight_time]]
+time_s = 80.0
+results = [{}]
+mass = {{ from = "rigid-body-modes" }}
+"""
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_packages_and_plans_that_polars_writes_are_read_whatever_the_codec(tmp_path, codec):
+    for inputs in ["vehicles", "dispersions"]:
+        shutil.copytree(ROOT / inputs, tmp_path / inputs)
+    plan = '\n[plan]\nkind = "file"\npath = "plan.parquet"\ncolumns = "normal_score"\n'
+    text = run_file("vehicles/sls-like", "dispersions/reference.toml", 3, [105.0], ["booster.*"], ["jet_damping"])
+    (tmp_path / "drawn.toml").write_text(text)
+    (tmp_path / "planned.toml").write_text(text.replace("cases = 3\n", "") + plan)
+    told = tvse("nominal", tmp_path / "drawn.toml")
+    tvse("plan", tmp_path / "drawn.toml", "-o", tmp_path / "drawn.parquet")
+    drawn = pl.read_parquet(tmp_path / "drawn.parquet").filter(pl.col("population") == "dispersed")
+    outline = json.loads(pq.read_metadata(tmp_path / "drawn.parquet").metadata[b"tvse.run"])
+    scores = {d["key"]: "z_" + d["column"][5:] for d in outline["draws"]}
+    for file in (tmp_path / "vehicles/sls-like/modes/tables").iterdir():
+        pl.read_parquet(file).write_parquet(file, compression=codec)
+    assert tvse("nominal", tmp_path / "drawn.toml") == told
+    frame = pl.DataFrame({key: drawn[column] for key, column in scores.items()})
+    frame.write_parquet(tmp_path / "plan.parquet", compression=codec)
+    tvse("plan", tmp_path / "planned.toml", "-o", tmp_path / "planned.parquet")
+    planned = pl.read_parquet(tmp_path / "planned.parquet").filter(pl.col("population") == "dispersed")
+    for column in scores.values():
+        assert planned[column].to_list() == drawn[column].to_list(), column
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_results_that_polars_writes_are_those_of_the_same_csv(tmp_path, codec):
+    said = {}
+    for kind in ["csv", "parquet"]:
+        for table in ["nodes", "modes", "systems", "masses"]:
+            source = ROOT / f"tests/data/fem/{table}.csv"
+            if kind == "csv":
+                shutil.copy(source, tmp_path)
+            else:
+                frame = pl.read_csv(source, infer_schema_length=None)
+                frame.write_parquet(tmp_path / f"{table}.parquet", compression=codec)
+        files = ", ".join(f'"{table}.{kind}"' for table in ["nodes", "modes", "systems"])
+        (tmp_path / "import.toml").write_text(IMPORT.format(files))
+        words = [TVSE, "import", "import.toml", "-o", f"made_{kind}"]
+        done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
+        said[kind] = (done.returncode, (done.stdout + done.stderr).replace(f".{kind}", "").replace(f"_{kind}", ""))
+    assert said["csv"][0] != 3 and "Disabled" not in said["parquet"][1]
+    assert said["parquet"] == said["csv"]

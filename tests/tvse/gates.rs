@@ -49,7 +49,8 @@ fn a_regression_gate_holds_a_run_against_another_one_on_the_same_draws() {
     };
     let cases = least("worse").into_iter().zip(least("before")).skip(1);
     let expected = cases.map(|(worse, before)| worse - before).fold(f64::INFINITY, f64::min);
-    let report: serde_json::Value = serde_json::from_str(&study.text("worse/gates.json")).unwrap();
+    let report: serde_json::Value =
+        serde_json::from_str(&study.text("worse/baseline_gates.json")).unwrap();
     let found = report["gates"][0]["value"].as_f64().unwrap() / 100.0;
     assert!((found - expected).abs() < 1e-12, "{found} {expected}");
     // Other draws are no baseline, and a gate that needs one is told where there is none.
@@ -61,6 +62,21 @@ fn a_regression_gate_holds_a_run_against_another_one_on_the_same_draws() {
     assert!(alone.err.contains("gate[0].baseline_run: found no baseline run"), "{}", alone.err);
     let words = ["gate", "worse", "--gates", "regression.toml", "--baseline", "before"];
     assert_eq!(said(&study.path(""), &words).code, 1);
+    // Gates of the run alone leave those outcomes, and are left by them.
+    let kept = study.text("worse/baseline_gates.json");
+    assert!(!study.path("worse/gates.json").exists());
+    fs::write(
+        study.path("own.toml"),
+        "[[gate]]\nid = \"own\"\nmetric = \"damping_ratio\"\nvariant = \"jet_damping\"\nmode = \"tvse\"\n\
+         statistic = \"minimum\"\nat_least_percent = -50.0\nrationale = \"of the run alone\"\n",
+    )
+    .unwrap();
+    let own = said(&study.path(""), &["gate", "worse", "--gates", "own.toml"]);
+    assert_eq!(own.code, 0, "{own:?}");
+    let alone = study.text("worse/gates.json");
+    compare("worse");
+    assert_eq!(study.text("worse/gates.json"), alone);
+    assert_eq!(study.text("worse/baseline_gates.json"), kept);
 }
 
 #[test]
@@ -84,7 +100,7 @@ fn outcomes_go_where_ci_systems_look() {
     assert!(markdown.contains("❌ fail") && !markdown.contains("<b>"), "{markdown}");
     assert_eq!(study.text("summary.md"), format!("# Job\n{markdown}"));
     // Every case that counts against the gate is stored, the worst first, and can be replayed.
-    let stored = columns(&study.path("worse/gate_offenders.parquet"));
+    let stored = columns(&study.path("worse/baseline_gate_offenders.parquet"));
     let (cases, values) = (&stored.numbers["case"], &stored.numbers["value"]);
     assert_eq!(cases.len(), 6);
     assert!(values.is_sorted_by(|a, b| a <= b) && values[0] < Some(-0.0002), "{values:?}");

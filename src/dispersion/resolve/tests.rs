@@ -275,6 +275,9 @@ fn an_included_bearing_cannot_be_dispersed_but_a_separate_one_can() {
     // One separate bearing at an engine is enough: the stiffness then acts.
     vehicle.engines[1].actuators[1].bearing = Bearing::Separate;
     good(&text, &vehicle);
+    // Its damping is part of an actuator's closed-loop figure as its stiffness is.
+    let text = row("booster.*.bearing.damping", "booster", "");
+    one_problem(&text, "row[0].path", "booster.left.bearing.damping, booster.right", "separate");
 }
 
 #[test]

@@ -3,7 +3,9 @@
 use super::*;
 use crate::dynamics::DrawnBody;
 use crate::dynamics::attached::rigid_motion;
-use crate::dynamics::{DrawnActuator, DrawnEngine, DrawnTank};
+use crate::dynamics::{DrawnActuator, DrawnAerodynamics, DrawnEngine, DrawnTank};
+use crate::modal::spectrum::{Base, Spectrum};
+use crate::modal::{Reference, Solver};
 use nalgebra::{DMatrix, Matrix3, Matrix3x2, Matrix3xX};
 
 /// Three modes and one canted engine, with no symmetry to hide a mistake.
@@ -411,6 +413,146 @@ fn a_turned_vehicle_that_accelerates_along_its_turned_thrust_is_in_equilibrium()
     }
 }
 
+/// The vectors of all poles are those of the state matrix less its null states and motion.
+fn assert_vectors(model: &Model, solver: &mut Solver, poles: &[faer::c64]) {
+    for &pole in poles {
+        let reference = Reference::new(model, solver.pair(model, pole));
+        let (right, left) = reference.state_vectors(model);
+        let state = solver.state_matrix(model).expect("built");
+        for row in 0..state.nrows() {
+            let image: faer::c64 = (0..state.nrows()).map(|j| right[j] * state[(row, j)]).sum();
+            let scale: f64 = (0..state.nrows()).map(|j| (right[j] * state[(row, j)]).norm()).sum();
+            assert!((image - pole * right[row]).norm() <= 1e-9 * scale.max(1e-9), "row {row}");
+        }
+        let product: faer::c64 = left.iter().zip(&right).map(|(l, r)| l.conj() * r).sum();
+        assert!((product - 1.0).norm() < 1e-6, "{product}");
+    }
+}
+
+/// The vehicle of [`free`] in the air, its thrust off the centreline.
+fn in_the_air() -> (Plant, DrawnVehicle) {
+    let (mut plant, mut drawn) = free();
+    plant.aerodynamics = Some(AerodynamicPlant {
+        reference_m: plant.body.cg_m,
+        area_m2: 50.0,
+        length_m: 8.0,
+        speed_m_s: 900.0,
+        entries: Vec::new(),
+    });
+    drawn.aerodynamics = Some(DrawnAerodynamics {
+        dynamic_pressure_pa: 2.5e4,
+        normal_force_slope_1_rad: 4.0,
+        center_of_pressure_x_m: 40.0,
+        axial_force: 0.6,
+        pitch_damping: -30.0,
+        roll_damping: -0.5,
+    });
+    (plant, drawn)
+}
+
+const AIR: Effects = Effects { thrust: 1.0, aerodynamics: 1.0, ..NOTHING };
+
+#[test]
+fn a_turn_about_the_mean_acceleration_at_a_constant_angle_of_attack_costs_nothing() {
+    let (plant, drawn) = in_the_air();
+    let model = assembled(&plant, &drawn, &AIR);
+    // Translations, the velocity along x, and this motion.
+    assert_eq!(model.null_states, [0, 1, 2, 3, model.second_order]);
+    let motion = model.null_motion.clone().expect("thrust off the centreline");
+    assert_eq!((motion.state, motion.others.len()), (3, 4));
+    let all = || std::iter::once((motion.state, 1.0)).chain(motion.others.iter().copied());
+    for row in 0..model.coordinates() {
+        let term = |(state, part): (usize, f64)| match state.checked_sub(model.second_order) {
+            Some(rate) => model.damping[(row, rate)] * part,
+            None => model.stiffness[(row, state)] * part,
+        };
+        let (sum, scale) = all().map(term).fold((0.0, 0.0), |(a, b), x| (a + x, b + f64::abs(x)));
+        assert!(sum.abs() <= 1e2 * f64::EPSILON * scale, "row {row}: {sum} of {scale}");
+    }
+}
+
+#[test]
+fn poles_under_thrust_off_the_centreline_in_the_air_are_those_of_the_whole_state_matrix() {
+    let (plant, drawn) = in_the_air();
+    let mut model = assembled(&plant, &drawn, &AIR);
+    let size = model.coordinates();
+    let (mut solver, mut poles) = (Solver::new(size), Vec::new());
+    solver.poles(&model, &mut poles).expect("solved");
+    for &pole in &poles {
+        let residual = solver.pair(&model, pole).residual;
+        assert!(residual <= 1e2 * size as f64 * f64::EPSILON, "{pole}: {residual}");
+    }
+    assert_vectors(&model, &mut solver, &poles);
+    let base = Base::of(&model, &mut solver).expect("solved");
+    let certified = Spectrum::new(size).solve(&base, &model).expect("certified");
+    assert_eq!(certified.len(), poles.len());
+    for found in certified {
+        let nearest = poles.iter().map(|s| (s - found.root).norm()).fold(f64::INFINITY, f64::min);
+        // Beside the bound, the rounding of the dense solver.
+        assert!(nearest <= found.bound + 1e-11 * found.root.norm().max(1.0), "{found:?} {nearest}");
+    }
+    // All but the motion, whose pole the whole matrix has near the origin.
+    let solved: usize = poles.iter().map(|s| if s.im > 0.0 { 2 } else { 1 }).sum();
+    assert_eq!(solved, 2 * size - 5);
+    (model.null_states, model.null_motion) = (vec![0, 1, 2, model.second_order], None);
+    let whole = solver.state_matrix(&model).expect("built").clone();
+    let all = whole.complex_eigenvalues();
+    for pole in &poles {
+        let nearest = all.iter().map(|s| (s - pole).norm()).fold(f64::INFINITY, f64::min);
+        assert!(nearest < 1e-9 * pole.norm().max(1.0), "{pole}: {nearest}");
+    }
+    let least = all.iter().map(|s| s.norm()).fold(f64::INFINITY, f64::min);
+    assert!(least < 1e-9, "{least}");
+}
+
+#[test]
+fn between_two_vehicles_each_with_its_own_turn_there_is_a_model_that_is_solved() {
+    let (plant, drawn) = in_the_air();
+    let nominal = assembled(&plant, &drawn, &AIR);
+    let mut other = drawn.clone();
+    other.engines[0].thrust_n *= 1.1;
+    other.aerodynamics.as_mut().expect("in the air").axial_force = 0.2;
+    let case = assembled(&plant, &other, &AIR);
+    assert_ne!(nominal.null_motion, case.null_motion);
+    let mut between = Model::zeros(nominal.coordinates());
+    for t in [0.0, 0.3, 1.0] {
+        between.blend(&nominal, &case, t);
+        let mut poles = Vec::new();
+        Solver::new(between.coordinates()).poles(&between, &mut poles).expect("solved");
+    }
+}
+
+#[test]
+fn a_rigid_vehicle_in_the_air_has_its_textbook_short_period() {
+    let (mut plant, mut drawn) = rigid_with_slosh(0.0);
+    plant.layout = Layout::new([], [("booster.left".to_owned(), ["rock", "tilt"], false)]);
+    plant.layout = plant.layout.with_rigid_body();
+    (plant.tanks, drawn.tanks) = (Vec::new(), Vec::new());
+    let (air, in_air) = in_the_air();
+    let (mut air, mut in_air) = (air.aerodynamics.unwrap(), in_air.aerodynamics.unwrap());
+    air.reference_m = Vector3::zeros();
+    (in_air.center_of_pressure_x_m, in_air.axial_force) = (-7.0, 0.0);
+    let [force, damping] = [in_air.normal_force_slope_1_rad, in_air.pitch_damping]
+        .map(|coefficient| in_air.dynamic_pressure_pa * air.area_m2 * coefficient);
+    let (speed, arm) = (air.speed_m_s, in_air.center_of_pressure_x_m);
+    let damping = damping * air.length_m.powi(2) / (2.0 * speed);
+    (plant.aerodynamics, drawn.aerodynamics) = (Some(air), Some(in_air));
+    let model = assembled(&plant, &drawn, &Effects { aerodynamics: 1.0, ..NOTHING });
+    let mut poles = Vec::new();
+    Solver::new(6).poles(&model, &mut poles).expect("solved");
+    // α̇ = q − N α/(m V), I q̇ = −N x_cp α + M_q q: forward of the cg it diverges.
+    let (m, i) = (plant.body.mass_kg, plant.body.inertia_kg_m2[(2, 2)]);
+    let (a, b) =
+        (force / (m * speed) - damping / i, force * arm / i - force * damping / (m * speed * i));
+    let root = (a * a / 4.0 - b).sqrt();
+    for expected in [-a / 2.0 + root, -a / 2.0 - root] {
+        let near = poles.iter().filter(|pole| (*pole - expected).norm() < 1e-9 * expected.abs());
+        assert_eq!(near.count(), 2, "{expected} in pitch and yaw: {poles:?}");
+    }
+    // Beside these, roll; every heading and its velocity are at the origin.
+    assert_eq!((poles.len(), model.null_states.len()), (5, 5));
+}
+
 #[test]
 fn twelve_rigid_poles_are_null_by_construction_and_flow_leaves_those_it_does_not_damp() {
     let (plant, drawn) = free();
@@ -429,18 +571,7 @@ fn twelve_rigid_poles_are_null_by_construction_and_flow_leaves_those_it_does_not
     let mut solver = crate::modal::Solver::new(model.coordinates());
     solver.poles(&model, &mut poles).expect("solved");
     assert_eq!(poles.len(), 7 + 2);
-    for &pole in &poles {
-        let reference = crate::modal::Reference::new(&model, solver.pair(&model, pole));
-        let (right, left) = reference.state_vectors(&model);
-        let state = solver.state_matrix(&model).expect("built");
-        for row in 0..state.nrows() {
-            let image: faer::c64 = (0..state.nrows()).map(|j| right[j] * state[(row, j)]).sum();
-            let scale: f64 = (0..state.nrows()).map(|j| (right[j] * state[(row, j)]).norm()).sum();
-            assert!((image - pole * right[row]).norm() <= 1e-9 * scale.max(1e-9), "row {row}");
-        }
-        let product: faer::c64 = left.iter().zip(&right).map(|(l, r)| l.conj() * r).sum();
-        assert!((product - 1.0).norm() < 1e-6, "{product}");
-    }
+    assert_vectors(&model, &mut solver, &poles);
     // … and two nozzles canted differently damp them all.
     let (mut two, mut pair) = (plant.clone(), drawn.clone());
     let mut other = two.attachments[0].clone();

@@ -77,13 +77,25 @@ impl Pencil {
                 };
             }
         }
-        // A motion that nothing damps: its columns add up to s² M v.
+        // A motion at no cost: its columns add up to s² M v where it is a turn that goes on, and to
+        // s (M v s + D v + M w) where it is a turn v with a velocity w.
         if let Some(motion) = &model.null_motion {
-            let column = |state: usize| state - n + states;
+            let place = |coordinate: usize| coordinate + states;
+            let (most, turned) = (place(motion.state % n), motion.state < n);
+            if self.degree[most] != 2 - usize::from(turned) {
+                return false;
+            }
             for row in self.entries.chunks_exact_mut(size) {
-                let sum = motion.others.iter().map(|(state, ratio)| ratio * row[column(*state)][0]);
-                let most = column(motion.state);
-                row[most] = [row[most][0] + sum.sum::<f64>(), 0.0, 0.0];
+                let [mut m, mut d, _] = row[most];
+                for &(state, ratio) in &motion.others {
+                    let other = row[place(state % n)];
+                    match (turned, state < n) {
+                        (true, true) => (m, d) = (m + ratio * other[0], d + ratio * other[1]),
+                        (true, false) => d += ratio * other[0],
+                        (false, _) => (m, d) = (m + ratio * other[0], 0.0),
+                    }
+                }
+                row[most] = [m, d, 0.0];
             }
         }
         let entries = &self.entries;
