@@ -21,8 +21,8 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  tvse influence runs/reference
-  tvse influence runs/reference --variant jet_damping --time 110 --output influence.csv")]
+  tvse influence runs/worst-on-worst
+  tvse influence runs/worst-on-worst --variant jet_damping --time 110 --output influence.csv")]
 pub struct Args {
     /// Folder of the run
     run: PathBuf,

@@ -482,6 +482,14 @@ fn poles_under_thrust_off_the_centreline_in_the_air_are_those_of_the_whole_state
         assert!(residual <= 1e2 * size as f64 * f64::EPSILON, "{pole}: {residual}");
     }
     assert_vectors(&model, &mut solver, &poles);
+    // Determinants divide the same motion out.
+    let base = crate::modal::spectrum::Base::proven(&model, &mut solver).expect("certified");
+    let certified =
+        crate::modal::spectrum::Spectrum::new(size).solve(&base, &model).expect("certified");
+    assert_eq!(certified.len(), poles.len());
+    for (found, pole) in certified.iter().zip(&poles) {
+        assert!((found.root - pole).norm() <= 1e-9 * pole.norm(), "{} is not {pole}", found.root);
+    }
     // All but the motion, whose pole the whole matrix has near the origin.
     let solved: usize = poles.iter().map(|s| if s.im > 0.0 { 2 } else { 1 }).sum();
     assert_eq!(solved, 2 * size - 5);

@@ -46,6 +46,11 @@ pub trait Vector: Copy {
     fn max(self, other: Self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
+    /// Absolute value.
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.max(Self::splat(0.0).sub(self))
+    }
 }
 
 /// Complex numbers in registers.
