@@ -14,6 +14,8 @@ use std::sync::mpsc;
 
 /// Cases handed to a thread at once: few, so that the last ones are shared out evenly.
 const BLOCK: usize = 4;
+/// Cases handed to a thread at once where one takes microseconds, less than handing it over.
+const LARGE_BLOCK: usize = 256;
 /// Blocks in flight for each thread; they bound the memory and let the threads work on while
 /// records are written.
 const BLOCKS_PER_THREAD: usize = 8;
@@ -83,6 +85,7 @@ pub struct Progress {
 #[derive(Debug)]
 pub struct Pool {
     threads: rayon::ThreadPool,
+    block: usize,
 }
 
 impl Pool {
@@ -95,7 +98,12 @@ impl Pool {
             .num_threads(jobs.max(1))
             .thread_name(|index| format!("{THREAD}{index}"))
             .build()?;
-        Ok(Self { threads })
+        Ok(Self { threads, block: BLOCK })
+    }
+
+    /// The pool for cases that take microseconds: more of them are handed to a thread at once.
+    pub fn of_small_cases(self) -> Self {
+        Self { block: LARGE_BLOCK, ..self }
     }
 
     /// Runs `work` so that what it does in parallel is done on the threads of the pool.
@@ -123,7 +131,7 @@ impl Pool {
     ) -> Result<Progress, E> {
         let total = spans.iter().map(|s| s.cases.end.saturating_sub(s.cases.start)).sum();
         let mut counts = Progress { total, ..Progress::default() };
-        let mut blocks = spans.iter().flat_map(blocks);
+        let mut blocks = spans.iter().flat_map(|span| blocks(span, self.block));
         let window = BLOCKS_PER_THREAD * self.threads.current_num_threads();
         let abandoned = &AtomicBool::new(false);
         let evaluate = &evaluate;
@@ -139,7 +147,7 @@ impl Pool {
                     waiting.push_back(None);
                     let sender = sender.clone();
                     scope.spawn(move |_| {
-                        let mut records = Vec::new();
+                        let mut records = Vec::with_capacity(self.block);
                         for case in block.cases {
                             if abandoned.load(Ordering::Relaxed) || stop.load(Ordering::Relaxed) {
                                 break;
@@ -173,12 +181,12 @@ impl Pool {
     }
 }
 
-fn blocks(span: &Span) -> impl Iterator<Item = Span> {
+fn blocks(span: &Span, size: usize) -> impl Iterator<Item = Span> + use<> {
     let (population, end) = (span.population, span.cases.end);
     span.cases
         .clone()
-        .step_by(BLOCK)
-        .map(move |start| Span { population, cases: start..end.min(start + BLOCK as u64) })
+        .step_by(size)
+        .map(move |start| Span { population, cases: start..end.min(start + size as u64) })
 }
 
 /// The record of a case, whatever happens inside it.

@@ -43,7 +43,7 @@ pub mod worst;
 pub use error::Error;
 
 use crate::campaign::pool;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::borrow::Cow;
 use std::io::{self, ErrorKind, StdoutLock, Write};
 use std::process::ExitCode;
@@ -148,7 +148,7 @@ fn silence_panics_of_cases() {
 /// Parses the arguments of the process, runs the command and returns the exit code.
 pub fn run() -> ExitCode {
     silence_panics_of_cases();
-    let arguments = Arguments::parse();
+    let arguments = arguments();
     let mut out = Output(io::stdout().lock());
     let result: Result<u8, Error> = match &arguments.command {
         Command::Init(args) => init::run(args, &mut out),
@@ -191,6 +191,23 @@ pub fn run() -> ExitCode {
     ExitCode::from(code)
 }
 
+/// The arguments of the process, or the end of it with what is wrong with them.
+fn arguments() -> Arguments {
+    let mut command = with_negative_numbers(Arguments::command());
+    let matches = command.get_matches_mut();
+    Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit())
+}
+
+/// A number below zero after an option is its value, for which the option may have a better word
+/// than that there is no option of this name.
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let number = |arg: clap::Arg| {
+        let value = arg.get_action().takes_values() && !arg.is_positional();
+        if value { arg.allow_negative_numbers(true) } else { arg }
+    };
+    command.mut_args(number).mut_subcommands(with_negative_numbers)
+}
+
 /// Says a line on the standard error; that nobody can read it stops no campaign.
 fn say(line: impl std::fmt::Display) {
     let _ = writeln!(std::io::stderr(), "{line}");
@@ -199,6 +216,19 @@ fn say(line: impl std::fmt::Display) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_number_below_zero_is_the_value_of_its_option() {
+        let command = with_negative_numbers(Arguments::command());
+        command.clone().debug_assert();
+        for sub in command.get_subcommands() {
+            for arg in sub.get_arguments().filter(|arg| arg.get_action().takes_values()) {
+                assert!(arg.is_positional() || arg.is_allow_negative_numbers_set(), "{arg}");
+            }
+        }
+        let line = ["tvse", "margins", "--numerator", "1", "--denominator", "1,1", "--delay", "-1"];
+        assert!(command.try_get_matches_from(line).is_ok());
+    }
 
     #[test]
     fn what_would_steer_a_terminal_is_shown_instead_of_obeyed() {

@@ -165,6 +165,7 @@ fn run_campaign(
 ) -> Result<u8, Error> {
     let (opening, access) = args.options.opening(folder, true)?;
     let (pool, jobs) = args.options.pool()?;
+    let pool = pool.of_small_cases();
     let interrupt = Interrupt::listen().map_err(|e| Error::Usage(format!("signals: {e}")))?;
     let pair = PlanarCampaign::new(parameters, &args.scatter, args.seed);
     let inputs = Inputs::of_text("planar.txt", &format!("{parameters:#?}\n"));

@@ -9,6 +9,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
+/// Time between two looks of the bar: cases may take microseconds.
+const SHOWN_EVERY: Duration = Duration::from_millis(50);
 /// Time between two lines of JSON, and between two texts of the lock.
 const EVERY: Duration = Duration::from_secs(2);
 /// Shortest time between two shards that are written because of the time alone.
@@ -34,6 +36,7 @@ pub struct Shown {
     show: Show,
     bar: ProgressBar,
     begun: Instant,
+    shown: Option<Instant>,
     told: Instant,
     saved: Instant,
     save_every: Option<Duration>,
@@ -53,7 +56,7 @@ impl Shown {
             bar.set_style(style);
         }
         let now = Instant::now();
-        Self { show, bar, begun: now, told: now, saved: now, save_every }
+        Self { show, bar, begun: now, shown: None, told: now, saved: now, save_every }
     }
 
     /// Begins with `total` cases.
@@ -65,16 +68,21 @@ impl Shown {
 
     /// Shows how far the campaign has come; gives what is to be told to others, when it is time.
     pub fn show(&mut self, progress: &Progress) -> Option<Told> {
+        let last = progress.done == progress.total;
+        let now = Instant::now();
+        if !last && self.shown.is_some_and(|shown| now - shown < SHOWN_EVERY) {
+            return None;
+        }
+        self.shown = Some(now);
         self.bar.set_position(progress.done);
         if progress.failed > 0 || progress.unstable > 0 {
             let Progress { unstable, failed, .. } = progress;
             self.bar.set_message(format!(", {unstable} unstable, {failed} failed"));
         }
-        let last = progress.done == progress.total;
-        if self.told.elapsed() < EVERY && !last {
+        if now - self.told < EVERY && !last {
             return None;
         }
-        self.told = Instant::now();
+        self.told = now;
         let told = self.told_of(progress);
         if self.show == Show::Json {
             let line = serde_json::to_string(&told).expect("text keys only");

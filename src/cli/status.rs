@@ -9,12 +9,14 @@ use std::path::PathBuf;
 /// How far a run has come, who works on it, and what is missing or damaged.
 ///
 /// Touches nothing. Cases are counted once they are on the disk; processes at work say themselves
-/// how far they are. Exit code 0 if the run is finished or at work, 3 if it was stopped or holds
-/// damaged shards.
+/// how far they are. Names, sizes and first lines of shards and tables are looked at; with --verify
+/// every byte is read and held against its digest, as resuming, merging and every reading command
+/// do. Exit code 0 if the run is finished or at work, 3 if it was stopped or holds something damaged.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   tvse status runs/reference
+  tvse status runs/reference --verify        # a single changed bit is found
   tvse status runs/reference --missing 8     # parts of 8 that have cases left, for --array=…")]
 pub struct Args {
     /// Folder of the run
@@ -22,6 +24,9 @@ pub struct Args {
     /// Prints only the numbers of the parts out of N that have cases left, with commas
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     missing: Option<u64>,
+    /// Reads all shards and tables and holds them against their digests; what is damaged is missing
+    #[arg(long)]
+    verify: bool,
 }
 
 /// Runs the command.
@@ -29,7 +34,7 @@ pub struct Args {
 /// # Errors
 /// No such run; output that cannot be written.
 pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
-    let status = store::status(&args.run)?;
+    let status = store::status(&args.run, args.verify)?;
     if let Some(of) = args.missing {
         let numbers: Vec<String> = status.parts_left(of).iter().map(u64::to_string).collect();
         writeln!(out, "{}", numbers.join(","))?;

@@ -219,7 +219,7 @@ fn left(output: &Path, shards: u64) -> Result<Vec<u64>, Error> {
     if !output.exists() {
         return Ok((1..=shards).collect());
     }
-    Ok(store::status(output)?.parts_left(shards))
+    Ok(store::status(output, true)?.parts_left(shards))
 }
 
 /// A job's script.

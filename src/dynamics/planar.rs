@@ -280,19 +280,26 @@ impl Planar {
         if !monic.iter().all(|x| x.is_finite()) {
             return None;
         }
-        let mut companion = Matrix4::zeros();
-        for i in 0..4 {
-            companion[(i, 3)] = -monic[i];
-            if i > 0 {
-                companion[(i, i - 1)] = 1.0;
+        let p = &self.0;
+        let omegas = [p.actuator_omega_rad_s / sigma, p.mode_omega_rad_s / sigma];
+        let zetas = [p.actuator_damping_ratio, p.mode_damping_ratio];
+        // Without coupling these are the factors themselves.
+        let apart = std::array::from_fn(|i| [2.0 * zetas[i] * omegas[i], omegas[i] * omegas[i]]);
+        let start = match factors(&monic, apart) {
+            Some(factors) => {
+                let [[a, b], [c, d]] = factors.map(roots);
+                [a, b, c, d]
             }
+            None => eigenvalues(&monic)?,
+        };
+        let mut poles = start;
+        for i in 0..4 {
+            poles[i] = if i > 0 && start[i] == start[i - 1].conj() {
+                poles[i - 1].conj()
+            } else {
+                polish(&monic, start[i]) * sigma
+            };
         }
-        let start = Schur::try_new(companion, f64::EPSILON, 1000)?.complex_eigenvalues();
-        let mut poles: [Complex<f64>; 4] = std::array::from_fn(|i| {
-            let polished = polish(&monic, Complex::new(start[i].re, start[i].im.abs()));
-            let above = start[i].im >= 0.0;
-            if above { polished * sigma } else { polished.conj() * sigma }
-        });
         let key = |p: &Complex<f64>| (p.im.abs(), p.re, -p.im);
         poles.sort_by(|x, y| {
             let ((x0, x1, x2), (y0, y1, y2)) = (key(x), key(y));
@@ -300,6 +307,69 @@ impl Planar {
         });
         Some(poles)
     }
+}
+
+/// The quadratics `t² + b t + c` whose product is a monic quartic, as `[b, c]`, from others near
+/// them: Newton's steps on the coefficients of the product.
+///
+/// They are taken only if their product has the quartic's coefficients to rounding, so that their
+/// roots are those of a quartic as near as any computed eigenvalues'; `None` where the steps do not
+/// get there, as they may not where the quadratics share a root.
+fn factors(monic: &[f64; 5], apart: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
+    // Each coefficient is a sum of at most three rounded products or terms, and rounded itself.
+    const ROUNDING: f64 = 4.0 * f64::EPSILON;
+    // Quadratic convergence: what is not found by then is not on its way.
+    const STEPS: usize = 20;
+    let [[mut b, mut c], [mut d, mut e]] = apart;
+    for _ in 0..STEPS {
+        let product = [c * e, b * e + d * c, c + e + b * d, b + d];
+        let [bs, cs, ds, es] = [b, c, d, e].map(f64::abs);
+        let size = [cs * es, bs * es + ds * cs, cs + es + bs * ds, bs + ds];
+        let left: [f64; 4] = std::array::from_fn(|i| monic[i] - product[i]);
+        if (0..4).all(|i| left[i].abs() <= ROUNDING * size[i]) {
+            return Some([[b, c], [d, e]]);
+        }
+        // db + dd = left₃, dc + de + d db + b dd = left₂, e db + b de + c dd + d dc = left₁,
+        // e dc + c de = left₀, with dd and de eliminated; the determinant is the resultant.
+        let rest = left[2] - b * left[3];
+        let (h, g) = (b - d, e - c);
+        let (r1, r0) = (left[1] - b * rest - c * left[3], left[0] - c * rest);
+        let determinant = (g + b * h) * g + c * h * h;
+        let db = (r1 * g + r0 * h) / determinant;
+        let dc = ((g + b * h) * r0 - c * h * r1) / determinant;
+        let dd = left[3] - db;
+        let de = rest - dc + h * db;
+        (b, c, d, e) = (b + db, c + dc, d + dd, e + de);
+    }
+    None
+}
+
+/// The roots of `t² + b t + c`, of a conjugate pair the one above the axis first.
+fn roots([b, c]: [f64; 2]) -> [Complex<f64>; 2] {
+    let half = b / 2.0;
+    let under = half * half - c;
+    if under < 0.0 {
+        let above = Complex::new(-half, (-under).sqrt());
+        return [above, above.conj()];
+    }
+    // The farther root is a sum of equal signs; the product of both is c.
+    let far = -(half + under.sqrt().copysign(half));
+    let near = if far == 0.0 { 0.0 } else { c / far };
+    [far, near].map(Complex::from)
+}
+
+/// The roots of a monic quartic as the eigenvalues of its companion matrix; `None` if the iteration
+/// does not converge.
+fn eigenvalues(monic: &[f64; 5]) -> Option<[Complex<f64>; 4]> {
+    let mut companion = Matrix4::zeros();
+    for i in 0..4 {
+        companion[(i, 3)] = -monic[i];
+        if i > 0 {
+            companion[(i, i - 1)] = 1.0;
+        }
+    }
+    let found = Schur::try_new(companion, f64::EPSILON, 1000)?.complex_eigenvalues();
+    Some(std::array::from_fn(|i| found[i]))
 }
 
 /// Newton's steps on a monic quartic as long as they make the residual smaller.
@@ -315,7 +385,7 @@ fn polish(monic: &[f64; 5], mut root: Complex<f64>) -> Complex<f64> {
     for _ in 0..4 {
         let next = root - residual / slope;
         let (p, d) = value(next);
-        if !(p.norm() < residual.norm()) {
+        if !(p.norm_sqr() < residual.norm_sqr()) {
             break;
         }
         (root, residual, slope) = (next, p, d);

@@ -160,7 +160,8 @@ pub fn recognise(model: &Model) -> Result<RigidBody, Vec<String>> {
     }
     let hz = |place: usize| model.modes[place].frequency_hz;
     for pair in body.elastic.windows(2) {
-        if hz(pair[0]) >= 0.0 && hz(pair[0]) <= MECHANISM * hz(pair[1]) {
+        // A frequency of zero has its own fault below.
+        if hz(pair[0]) > 0.0 && hz(pair[0]) <= MECHANISM * hz(pair[1]) {
             faults.push(format!(
                 "mode {} at {:.3e} Hz, {:.1e} of the next, and no rigid motion (residual {:.2}): a \
                  mechanism or a loose part",

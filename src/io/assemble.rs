@@ -1,12 +1,13 @@
 //! Tables made of shards: rows in canonical order, cut into row groups at fixed case indices.
 //!
 //! So the bytes of a table depend on its rows alone, not on how the cases were shared out nor on
-//! how often the run was interrupted. Memory holds one row group and one shard.
+//! how often the run was interrupted. Memory holds one block of a row group and one shard.
 
 use super::files::{self, Aside};
 use super::results::metadata;
 use super::run::Run;
 use super::schema::TableName;
+use super::scratch::Scratch;
 use super::store::{Segment, Store};
 use super::table::{self, Content, Sheet};
 use crate::problem::Problems;
@@ -26,10 +27,12 @@ pub fn assemble(store: &Store, table: TableName, folder: &Path) -> Result<Conten
     let failed = |error| table::problem(&target, &error);
     let text = serde_json::to_string(outline).expect("an outline has text keys only");
     let aside = Aside::within(store.folder(), &target)?;
-    let sheet =
-        Sheet::new(table.fields(outline), &metadata(table, &text), aside).map_err(failed)?;
-    let size = table.group_cases(outline);
-    let mut cutter = Cutter { target: &target, size, group: None, pending: vec![], sheet };
+    let scratch = Some(Scratch::within(store.folder())?);
+    let sheet = Sheet::new(table.fields(outline), &metadata(table, &text), aside, scratch)
+        .map_err(failed)?;
+    let (size, group) = (table.block_cases(outline), table.group_cases(outline));
+    let mut cutter =
+        Cutter { target: &target, size, blocks: group / size, block: None, pending: vec![], sheet };
     for Segment { span, shard } in store.segments() {
         let (first, last) = (span.cases.start, span.cases.end - 1);
         let mut seen: Option<(u64, u64)> = None;
@@ -55,9 +58,7 @@ pub fn assemble(store: &Store, table: TableName, folder: &Path) -> Result<Conten
         let path = match shard {
             Some(index) => {
                 let shard = &store.shards()[index];
-                for batch in shard.rows(table, outline)? {
-                    take(&shard.path, &batch)?;
-                }
+                shard.rows(table, outline, |batch| take(&shard.path, batch))?;
                 shard.path.clone()
             }
             None => {
@@ -126,13 +127,15 @@ fn case_indices(batch: &RecordBatch) -> Option<Cases<'_>> {
     (column.null_count() == 0).then(|| Cases(column.values(), 0))
 }
 
-/// Rows on their way into row groups.
+/// Rows on their way into blocks and row groups.
 struct Cutter<'a> {
     target: &'a Path,
-    /// Cases of a row group.
+    /// Cases of a block.
     size: u64,
-    /// Population and number of the row group under way.
-    group: Option<(usize, u64)>,
+    /// Blocks of a row group.
+    blocks: u64,
+    /// Population and number of the block under way.
+    block: Option<(usize, u64)>,
     pending: Vec<RecordBatch>,
     sheet: Sheet,
 }
@@ -144,10 +147,13 @@ impl Cutter<'_> {
         while from < batch.num_rows() {
             let number = cases.0[from] as u64 / self.size;
             let to = cases.partition_point_by(|case| case / self.size <= number);
-            if self.group.is_some_and(|group| group != (population, number)) {
-                self.end_group()?;
+            let group = |number: u64| number / self.blocks;
+            match self.block {
+                Some((p, n)) if (p, group(n)) != (population, group(number)) => self.end_group()?,
+                Some((_, n)) if n != number => self.end_block()?,
+                _ => (),
             }
-            self.group = Some((population, number));
+            self.block = Some((population, number));
             self.pending.push(batch.slice(from, to - from));
             from = to;
         }
@@ -155,6 +161,11 @@ impl Cutter<'_> {
     }
 
     fn end_group(&mut self) -> Result<(), Problems> {
+        self.end_block()?;
+        self.sheet.end_group().map_err(|error| table::problem(self.target, &error))
+    }
+
+    fn end_block(&mut self) -> Result<(), Problems> {
         let pending = std::mem::take(&mut self.pending);
         if pending.is_empty() {
             return Ok(());
@@ -169,7 +180,7 @@ impl Cutter<'_> {
         let written = columns
             .and_then(|columns| RecordBatch::try_new(schema, columns))
             .map_err(Into::into)
-            .and_then(|rows| self.sheet.group(&rows));
+            .and_then(|rows| self.sheet.block(&rows));
         written.map_err(|error| table::problem(self.target, &error))
     }
 }

@@ -146,6 +146,14 @@ pub fn absolute(path: &Path) -> Result<PathBuf, Problems> {
     std::path::absolute(path).map_err(|e| problem(path, &e, "a path"))
 }
 
+/// The folder in which something of this name lies.
+pub fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
 /// A path with every link followed, as far as it exists.
 pub fn resolved(path: &Path) -> PathBuf {
     if path.as_os_str().is_empty() {
@@ -191,10 +199,12 @@ pub fn first_line(path: &Path, most: usize) -> io::Result<Vec<u8>> {
 /// What the system says; a file that is too short.
 pub fn read_tail(path: &Path, tail: u64, skip: u64, length: u64) -> io::Result<Vec<u8>> {
     let mut file = File::open(path)?;
-    let start = file.metadata()?.len().checked_sub(tail);
+    let size = file.metadata()?.len();
+    let start = size.checked_sub(tail);
     let start = start.ok_or_else(|| io::Error::from(io::ErrorKind::UnexpectedEof))?;
     file.seek(SeekFrom::Start(start + skip))?;
-    let mut bytes = Vec::new();
+    // No more is asked for than there is, whatever a damaged header says.
+    let mut bytes = Vec::with_capacity(length.min(size) as usize);
     file.take(length).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
@@ -265,11 +275,7 @@ impl Aside {
     /// # Errors
     /// One problem if the folder is missing, not writable or full.
     pub fn beside(target: &Path) -> Result<Self, Problems> {
-        let folder = match target.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        Self::within(folder, target)
+        Self::within(folder_of(target), target)
     }
 
     /// Opens a file that will be called `target`, written in `folder` of the same file system;
@@ -353,10 +359,7 @@ impl Drop for Aside {
 fn sync_parent(path: &Path) -> io::Result<()> {
     fault::step()?;
     #[cfg(unix)]
-    if let Some(parent) = path.parent() {
-        let folder = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
-        File::open(folder)?.sync_all()?;
-    }
+    File::open(folder_of(path))?.sync_all()?;
     #[cfg(not(unix))]
     let _ = path;
     Ok(())

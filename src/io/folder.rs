@@ -13,7 +13,8 @@ use std::path::{Path, PathBuf};
 
 /// Writes `files` (paths inside the folder, and bytes) as the folder `target`. The parent of
 /// `target` is made where it is missing. A folder that exists is refused, or replaced as a whole
-/// where `replace` names a file that it holds: so nothing but a folder of its kind is replaced.
+/// where `replace` names a file that it holds: so nothing but a folder of its kind is replaced. Files
+/// beside `files` that such a folder may hold are named by `also`, paths inside it.
 ///
 /// # Errors
 /// One problem if the folder exists, or cannot be written; then nothing of it is left behind and
@@ -22,6 +23,7 @@ pub fn write(
     target: &Path,
     files: &[(PathBuf, Vec<u8>)],
     replace: Option<&str>,
+    also: &[PathBuf],
 ) -> Result<(), Problems> {
     let exists = fs::symlink_metadata(target).is_ok();
     if exists && replace.is_none_or(|mark| !target.join(mark).is_file()) {
@@ -33,8 +35,10 @@ pub fn write(
         };
         return Err(Problems::input(name(target), "", found, allowed));
     }
-    // Nothing but what would be written again is ever removed.
-    if let Some(entry) = foreign_entry(target, files).filter(|_| exists) {
+    // Nothing but files of its kind is ever removed.
+    let known: Vec<&Path> =
+        files.iter().map(|(file, _)| file).chain(also).map(PathBuf::as_path).collect();
+    if let Some(entry) = foreign_entry(target, &known).filter(|_| exists) {
         let found = format!("a folder that also holds `{entry}`");
         let allowed = "a folder with files of its kind alone";
         return Err(Problems::input(name(target), "", found, allowed));
@@ -46,17 +50,17 @@ pub fn write(
     fill(parent, target, files, exists).map_err(|e| write_problem(target, &e))
 }
 
-/// A file below the folder `target` that is not among `files`.
-fn foreign_entry(target: &Path, files: &[(PathBuf, Vec<u8>)]) -> Option<String> {
+/// A file below the folder `target` that is not among the `known` ones.
+fn foreign_entry(target: &Path, known: &[&Path]) -> Option<String> {
     let mut folders = vec![target.to_owned()];
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(folder).ok()?.flatten() {
             let path = entry.path();
             let inside = path.strip_prefix(target).ok()?.to_owned();
-            if files.iter().any(|(file, _)| *file == inside) {
+            if known.contains(&inside.as_path()) {
                 continue;
             }
-            if path.is_dir() && files.iter().any(|(file, _)| file.starts_with(&inside)) {
+            if path.is_dir() && known.iter().any(|file| file.starts_with(&inside)) {
                 folders.push(path);
                 continue;
             }
@@ -139,7 +143,7 @@ mod tests {
     fn a_folder_appears_with_all_its_files_and_nothing_beside_it() {
         let place = tempfile::tempdir().unwrap();
         let target = place.path().join("new/folder");
-        write(&target, &files("one"), None).unwrap();
+        write(&target, &files("one"), None, &[]).unwrap();
         assert_eq!(fs::read(target.join("tables/a")).unwrap(), b"table");
         assert_eq!(names(&place.path().join("new")), ["folder"]);
     }
@@ -148,11 +152,13 @@ mod tests {
     fn a_folder_that_exists_is_refused_and_replaced_only_where_it_holds_the_mark() {
         let place = tempfile::tempdir().unwrap();
         let target = place.path().join("folder");
-        write(&target, &files("one"), None).unwrap();
-        assert!(write(&target, &files("two"), None).unwrap_err().to_string().contains("--force"));
-        write(&target, &files("two"), Some("mark")).unwrap();
+        write(&target, &files("one"), None, &[]).unwrap();
+        assert!(
+            write(&target, &files("two"), None, &[]).unwrap_err().to_string().contains("--force")
+        );
+        write(&target, &files("two"), Some("mark"), &[]).unwrap();
         assert_eq!(fs::read(target.join("mark")).unwrap(), b"two");
-        assert!(write(&target, &files("three"), Some("other")).is_err());
+        assert!(write(&target, &files("three"), Some("other"), &[]).is_err());
         assert_eq!(fs::read(target.join("mark")).unwrap(), b"two");
         assert_eq!(names(place.path()), ["folder"]);
     }
@@ -162,13 +168,26 @@ mod tests {
         for foreign in ["notes.md", "tables/notes.md", "own/notes.md"] {
             let place = tempfile::tempdir().unwrap();
             let target = place.path().join("folder");
-            write(&target, &files("one"), None).unwrap();
+            write(&target, &files("one"), None, &[]).unwrap();
             fs::create_dir_all(target.join("own")).unwrap();
             fs::write(target.join(foreign), "mine").unwrap();
-            assert!(write(&target, &files("two"), Some("mark")).is_err(), "{foreign}");
+            assert!(write(&target, &files("two"), Some("mark"), &[]).is_err(), "{foreign}");
             assert_eq!(fs::read(target.join(foreign)).unwrap(), b"mine");
             assert_eq!(fs::read(target.join("mark")).unwrap(), b"one");
         }
+    }
+
+    #[test]
+    fn a_file_of_its_kind_that_is_not_written_again_goes_with_the_folder() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("folder");
+        let also = [PathBuf::from("tables/b")];
+        let mut more = files("one");
+        more.push((also[0].clone(), b"second".to_vec()));
+        write(&target, &more, None, &[]).unwrap();
+        assert!(write(&target, &files("two"), Some("mark"), &[]).is_err());
+        write(&target, &files("two"), Some("mark"), &also).unwrap();
+        assert_eq!(names(&target.join("tables")), ["a"]);
     }
 
     #[test]
@@ -176,7 +195,7 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         fs::write(place.path().join("file"), "").unwrap();
         let target = place.path().join("file/folder");
-        let problems = write(&target, &files("one"), None).unwrap_err();
+        let problems = write(&target, &files("one"), None, &[]).unwrap_err();
         assert!(problems.to_string().contains("file/folder"), "{problems}");
     }
 }

@@ -29,6 +29,7 @@ pub mod run;
 pub mod scaffold;
 pub mod scenario;
 pub mod schema;
+mod scratch;
 pub mod shard;
 pub mod source;
 pub mod store;

@@ -104,6 +104,6 @@ pub fn write(
         files.push((PathBuf::from(&name), format.bytes(layout, table, &target.join(name))?));
     }
     let mark = format!("{}.{}", MATRICES.name, format.extension());
-    folder::write(target, &files, force.then_some(mark.as_str()))?;
+    folder::write(target, &files, force.then_some(mark.as_str()), &[])?;
     Ok(files.into_iter().map(|(name, _)| target.join(name)).collect())
 }

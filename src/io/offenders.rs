@@ -50,7 +50,7 @@ pub fn write(report: &Report, folder: &str, target: &Path) -> Result<(), Problem
     let failed = |error| problem(target, &error);
     let out = Aside::beside(target)?;
     let metadata = [("most_cases_a_gate", Outcome::OFFENDERS.to_string())];
-    let mut table = Table::new(columns(), &metadata, out).map_err(failed)?;
+    let mut table = Table::new(columns(), &metadata, out, None).map_err(failed)?;
     for gate in &report.gates {
         for offender in &gate.offenders {
             table.push(&Row {

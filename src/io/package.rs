@@ -312,7 +312,8 @@ fn write_with(
     };
     let text = toml::to_string(&header).expect("a flat header is always TOML");
     contents.push((HEADER.into(), text.into_bytes()));
-    folder::write(dir, &contents, force.then_some(HEADER))
+    // A package that was imported has one table more.
+    folder::write(dir, &contents, force.then_some(HEADER), &[table_path(&SECTIONS)])
 }
 
 /// Where the modes of the package in `dir` were imported from, with the quality of its sections;

@@ -1,6 +1,7 @@
 //! The draws of a run as a Parquet file of their own.
 
 use super::files::{self, Aside};
+use super::scratch::Scratch;
 use super::table::{self, Table};
 use super::{results, schema};
 use crate::campaign::metric::ReducedCase;
@@ -20,7 +21,11 @@ pub fn write(path: &Path, outline: &Outline, sampler: &Sampler<'_>) -> Result<u6
     let failed = |error| table::problem(path, &error);
     let metadata = results::metadata(schema::TableName::Cases, &text);
     let columns = schema::plan(outline);
-    let mut table = Table::new(columns, &metadata, Aside::beside(path)?).map_err(failed)?;
+    let aside = Aside::beside(path)?;
+    let scratch = Some(Scratch::within(files::folder_of(path))?);
+    let mut table = Table::new(columns, &metadata, aside, scratch).map_err(failed)?;
+    let block = schema::TableName::Cases.block_cases(outline);
+    let group = schema::TableName::Cases.group_cases(outline);
     let mut cursor = sampler.cursor();
     for (index, population) in outline.definition.populations.iter().enumerate() {
         for case in 0..population.cases {
@@ -45,8 +50,10 @@ pub fn write(path: &Path, outline: &Outline, sampler: &Sampler<'_>) -> Result<u6
                 loops: Vec::new(),
                 failure: None,
             });
-            if (case + 1) % schema::TableName::Cases.group_cases(outline) == 0 {
+            if (case + 1) % group == 0 {
                 table.end_group().map_err(failed)?;
+            } else if (case + 1) % block == 0 {
+                table.end_block().map_err(failed)?;
             }
         }
         table.end_group().map_err(failed)?;

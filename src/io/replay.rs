@@ -148,7 +148,7 @@ impl Replay {
                 .map_err(|error| super::table::problem(&target.join(&name), &error))?;
             files.push((PathBuf::from(name), bytes));
         }
-        folder::write(target, &files, force.then_some("matrices.parquet"))?;
+        folder::write(target, &files, force.then_some("matrices.parquet"), &[])?;
         Ok(files.into_iter().map(|(name, _)| target.join(name)).collect())
     }
 }

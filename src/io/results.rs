@@ -164,12 +164,20 @@ impl Results {
         let next = store.folder().join(NEXT);
         files::ensure_folder(&next.join(TABLES))?;
         let mut contents = BTreeMap::new();
-        for table in TableName::of_cases(store.outline()) {
-            contents.insert(table, assemble::assemble(store, table, &next)?);
+        for tables in TableName::of_cases(store.outline()).chunks(jobs.max(1)) {
+            let assembled = at_once(tables, |table| assemble::assemble(store, *table, &next));
+            for (table, content) in tables.iter().zip(assembled) {
+                contents.insert(*table, content?);
+            }
         }
         let mut run = Run::of(&next, store.outline().clone(), contents);
-        let rows = summarise::summary(&run, summarise::MEMORY)?;
-        let worst_rows = summarise::worst(&run, worst)?;
+        let (rows, worst_rows) = std::thread::scope(|scope| {
+            let worst = || summarise::worst(&run, worst);
+            let aside = (jobs > 1).then(|| scope.spawn(worst));
+            let rows = summarise::summary(&run, summarise::MEMORY);
+            (rows, aside.map_or_else(worst, joined))
+        });
+        let (rows, worst_rows) = (rows?, worst_rows?);
         let outline = run.outline();
         let described = schema::dictionary(outline);
         let write = Writing { folder: store.folder(), next: &next, outline };
@@ -206,6 +214,21 @@ impl Results {
     }
 }
 
+/// What `work` makes of each item, each on its own thread; of one item, on this one.
+fn at_once<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let work = &work;
+    std::thread::scope(|scope| {
+        let Some((first, others)) = items.split_first() else { return Vec::new() };
+        let others: Vec<_> = others.iter().map(|item| scope.spawn(move || work(item))).collect();
+        std::iter::once(work(first)).chain(others.into_iter().map(joined)).collect()
+    })
+}
+
+/// What a thread made, or its panic.
+fn joined<R>(thread: std::thread::ScopedJoinHandle<'_, R>) -> R {
+    thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+}
+
 /// Where tables that are made of others are written.
 struct Writing<'a> {
     folder: &'a Path,
@@ -225,7 +248,7 @@ impl Writing<'_> {
         let text = serde_json::to_string(self.outline).expect("an outline has text keys only");
         // Written aside elsewhere: a folder of tables holds nothing else, whatever happens.
         let aside = Aside::within(self.folder, &target)?;
-        let mut table = Table::new(columns, &metadata(name, &text), aside).map_err(failed)?;
+        let mut table = Table::new(columns, &metadata(name, &text), aside, None).map_err(failed)?;
         rows.iter().for_each(|row| table.push(row));
         let (aside, content) = table.close().map_err(failed)?;
         aside.finish()?;
@@ -321,9 +344,10 @@ mod tests {
     fn row_groups_end_at_fixed_case_indices_and_with_their_population() {
         let folder = tempfile::tempdir().unwrap();
         let run = folder.path().join("run");
-        let outline = cases::outline(&CASES, StoredPoles::All);
-        // 2 variants × 2 flight times × 128 poles reckoned with: 256 cases.
-        assert_eq!(TableName::Modes.group_cases(&outline), 256);
+        let outline = cases::outline(&[1, 2100, 40], StoredPoles::All);
+        // 2 variants × 2 flight times × 128 poles reckoned with, 26 columns: blocks of 32 cases.
+        assert_eq!(TableName::Modes.group_cases(&outline), 2048);
+        assert_eq!(TableName::Cases.group_cases(&outline), 262_144);
         synthetic::run(&run, outline, 2).unwrap();
         let first_cases = |table: TableName| -> Vec<(String, i64)> {
             let file = || File::open(run.join(table.file())).unwrap();
@@ -344,9 +368,8 @@ mod tests {
             expected.push(("corner_dispersed".to_owned(), 0));
             expected
         };
-        assert_eq!(TableName::Cases.group_cases(&cases::outline(&CASES, StoredPoles::All)), 16384);
         assert_eq!(first_cases(TableName::Cases), expected(&[0]));
-        assert_eq!(first_cases(TableName::Modes), expected(&[0, 256, 512, 768, 1024]));
+        assert_eq!(first_cases(TableName::Modes), expected(&[0, 2048]));
     }
 
     #[test]
@@ -503,7 +526,7 @@ mod tests {
         let definition = outline.definition.clone();
         let written = |room: usize| -> Result<Content, ParquetError> {
             let metadata = metadata(TableName::Cases, "{}");
-            let mut table = Table::new(schema::cases(&outline), &metadata, Small(room))?;
+            let mut table = Table::new(schema::cases(&outline), &metadata, Small(room), None)?;
             let result = Pool::new(2).unwrap().run(
                 &definition,
                 &spans(&definition.populations),

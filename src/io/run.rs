@@ -95,6 +95,26 @@ impl Run {
         problems.into_result(run)
     }
 
+    /// Holds the tables of the run in `folder` against their sizes alone.
+    ///
+    /// # Errors
+    /// Damage: every table that is missing or of another size; a manifest that cannot be read.
+    pub(super) fn sizes(folder: &Path) -> Result<(), Problems> {
+        let manifest = Manifest::read(folder)?;
+        let mut problems = Problems::default();
+        for table in TableName::of_run(&manifest.run) {
+            let path = folder.join(table.file());
+            let found = files::size(&path).map_err(|error| error.to_string());
+            let allowed = manifest.tables.get(table.name()).map(|content| content.bytes);
+            if found.as_ref().ok() != allowed.as_ref() {
+                let found = found.map_or_else(|error| error, |bytes| format!("{bytes} bytes"));
+                let allowed = allowed.map_or("no such table".to_owned(), |b| format!("{b} bytes"));
+                problems.push(Kind::Damage, files::name(&path), "", found, allowed);
+            }
+        }
+        problems.into_result(())
+    }
+
     pub(super) fn of(
         folder: &Path,
         outline: Outline,
@@ -233,15 +253,15 @@ impl Run {
         let is_draw = |name: &str| draws.iter().any(|draw| draw.column == name);
         let chosen =
             |name: &str| name == "case" || is_draw(name) || scores.iter().any(|s| s == name);
-        let group = TableName::Cases.group_cases(&self.outline);
+        let block = TableName::Cases.block_cases(&self.outline);
         let mut wanted: BTreeMap<u64, Vec<u64>> = BTreeMap::new();
         for case in cases {
-            wanted.entry(case / group).or_default().push(case);
+            wanted.entry(case / block).or_default().push(case);
         }
         let mut found = BTreeMap::new();
         for (index, cases) in wanted {
-            let mut next = index * group;
-            let range = next..next + 1;
+            let mut next = index * block;
+            let range = next..next + block;
             let mut reader = self.reader(TableName::Cases, chosen, population, &range)?;
             while let Some(batch) = self.next(TableName::Cases, &mut reader)? {
                 self.check_cases(&batch, next)?;
@@ -329,7 +349,8 @@ impl Run {
         populations.iter().map(|p| p.cases.div_ceil(cases)).sum()
     }
 
-    /// Reads chosen columns of the row groups that hold some cases of a population.
+    /// Reads chosen columns of the row groups that hold some cases of a population; of the `cases`
+    /// table, just their rows.
     fn reader(
         &self,
         table: TableName,
@@ -357,6 +378,12 @@ impl Run {
             .with_projection(mask)
             .with_row_groups(wanted.map(|group| group as usize).collect())
             .with_batch_size(BATCH);
+        let builder = match table {
+            TableName::Cases => builder
+                .with_offset((cases.start % size) as usize)
+                .with_limit(end.saturating_sub(cases.start) as usize),
+            _ => builder,
+        };
         decoded(|| builder.build()).map_err(|found| self.damage(table, found, "a Parquet table"))
     }
 

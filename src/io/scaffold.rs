@@ -43,7 +43,7 @@ pub fn write(target: &Path) -> Result<Vec<&'static str>, Problems> {
     files::refuse_existing(target)?;
     let contents: Vec<(PathBuf, Vec<u8>)> =
         FILES.iter().map(|(path, bytes)| (path.into(), bytes.to_vec())).collect();
-    folder::write(target, &contents, None)?;
+    folder::write(target, &contents, None, &[])?;
     Ok(FILES.iter().map(|(path, _)| *path).collect())
 }
 

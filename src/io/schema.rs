@@ -25,18 +25,18 @@ use std::sync::Arc;
 /// Version of the tables' columns and metadata; a change of either raises it.
 pub const VERSION: u32 = 2;
 
-/// Most cases in a row group.
-const MOST_GROUP_CASES: u64 = 32768;
-/// Cells of a row group of the `cases` table are kept near this number: few row groups, since the
-/// footer that tells of them is held in memory, and small ones, since each is too.
-const GROUP_CELLS: u64 = 1 << 20;
-/// Rows of a row group of the `modes` table are kept near this number.
-const GROUP_ROWS: u64 = 128 << 10;
+/// Most cases in a block.
+const MOST_BLOCK_CASES: u64 = 4096;
+/// Cells of a block are kept near this number: so many are in memory while a table is written.
+const BLOCK_CELLS: u64 = 1 << 19;
+/// Blocks of a row group: many, since the footer that tells of row groups is held in memory, and is
+/// what grows with the cases. Their pages are not, see `scratch`.
+const GROUP_BLOCKS: u64 = 64;
 /// Poles of an evaluation reckoned with where all are stored.
-const ALL_POLES: u64 = 128;
+const ALL_POLES: usize = 128;
 
 /// Resonances reckoned with in a loop.
-const RESONANCES: u64 = 16;
+const RESONANCES: usize = 16;
 
 /// A results table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -135,39 +135,34 @@ impl TableName {
         }
     }
 
-    /// Cases in a full row group, where the table follows the cases; a power of two, so that
-    /// boundaries of all tables and of shards coincide. Fixed by the outline.
+    /// Cases in a full row group, where the table follows the cases: so many blocks. Fixed by the
+    /// outline, and a power of two, so that boundaries of all tables coincide.
     pub fn group_cases(self, outline: &Outline) -> u64 {
+        GROUP_BLOCKS * self.block_cases(outline)
+    }
+
+    /// Cases in a full block, of which all pages of a row group are made in turn, where the table
+    /// follows the cases; a power of two. Fixed by the outline.
+    pub fn block_cases(self, outline: &Outline) -> u64 {
         let definition = &outline.definition;
-        let (variants, times) = (definition.variants.len(), definition.flight_times_s.len());
+        let times = definition.flight_times_s.len();
         let plan = definition.margins.as_ref();
-        let axes = plan.map_or(0, |plan| plan.variants.len()) * AXES.len();
+        let loops = plan.map_or(0, |plan| plan.variants.len()) * AXES.len() * times;
         let rows = match self {
             Self::Modes => {
                 let poles = match outline.poles {
-                    StoredPoles::Named => definition.modes.len() as u64,
+                    StoredPoles::Named => definition.modes.len(),
                     StoredPoles::All => ALL_POLES,
                 };
-                // With derivatives a row is as long as many.
-                let rule = definition.sensitivity.as_ref();
-                let long = rule.map_or(0, |_| outline.draws.len() as u64 / 8);
-                (variants * times) as u64 * poles * (1 + long)
+                definition.variants.len() * times * poles
             }
-            Self::Margins => (axes * times) as u64,
-            Self::LoopModes => (axes * times) as u64 * RESONANCES,
-            Self::LoopCurves => {
-                (axes * times * plan.map_or(0, |plan| plan.envelope_hz.len())) as u64
-            }
-            _ => {
-                let loops = loop_metrics(definition).len();
-                let metrics = metrics(definition).len() + loops;
-                let columns = (metrics + 2 * outline.draws.len() + 4) as u64;
-                return 1 << (GROUP_CELLS / columns).clamp(1, MOST_GROUP_CASES).ilog2();
-            }
+            Self::Margins => loops,
+            Self::LoopModes => loops * RESONANCES,
+            Self::LoopCurves => loops * plan.map_or(0, |plan| plan.envelope_hz.len()),
+            _ => 1,
         };
-        let rows = rows.max(1);
-        let cases = (GROUP_ROWS / rows).clamp(1, MOST_GROUP_CASES);
-        1 << cases.ilog2()
+        let cells = (rows * self.fields(outline).len()).max(1) as u64;
+        1 << (BLOCK_CELLS / cells).clamp(1, MOST_BLOCK_CASES).ilog2()
     }
 }
 

@@ -31,7 +31,7 @@ const LARGEST: u64 = 2 << 30;
 /// Rows of one table after which a shard ends, so that its memory is bounded.
 const MOST_ROWS: u64 = 64 << 10;
 /// Cells of the `cases` table after which a shard ends.
-const MOST_CELLS: u64 = 1 << 20;
+const MOST_CELLS: u64 = 1 << 19;
 /// Cases after which a shard ends: soon enough that a long campaign takes no more memory than a
 /// short one.
 const MOST_CASES: u64 = 8192;
@@ -123,7 +123,7 @@ impl Filling {
     /// What the Parquet writer says.
     pub fn new(outline: &Outline, population: usize, first: u64) -> Result<Self, ParquetError> {
         fn open<R>(columns: Vec<Column<R>>) -> Result<Table<R, Vec<u8>>, ParquetError> {
-            Table::new(columns, &[], Vec::new())
+            Table::new(columns, &[], Vec::new(), None)
         }
         let rows = schema::cases(outline);
         let tables = TableName::of_cases(outline);
@@ -323,11 +323,16 @@ impl Shard {
         Ok((content, bytes))
     }
 
-    /// The rows of a table, once they are found to be those that the header says.
+    /// Hands the rows of a table to `take`, once they are found to be those that the header says.
     ///
     /// # Errors
-    /// Damage, with the name of the shard.
-    pub fn rows(&self, table: TableName, outline: &Outline) -> Result<Vec<RecordBatch>, Problems> {
+    /// Damage, with the name of the shard; what `take` returns.
+    pub fn rows(
+        &self,
+        table: TableName,
+        outline: &Outline,
+        mut take: impl FnMut(&RecordBatch) -> Result<(), Problems>,
+    ) -> Result<(), Problems> {
         let damage = |found: String, allowed: &str| {
             Problems::damage(files::name(&self.path), table.name(), found, allowed)
         };
@@ -351,10 +356,9 @@ impl Shard {
             return Err(damage(format!("{rows} rows"), &format!("{} rows", content.rows)));
         }
         let mut reader = decoded(|| builder.build()).map_err(unread)?;
-        let mut batches = Vec::new();
         while let Some(batch) = decoded(|| reader.next().transpose()).map_err(unread)? {
-            batches.push(batch);
+            take(&batch)?;
         }
-        Ok(batches)
+        Ok(())
     }
 }

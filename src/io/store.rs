@@ -637,7 +637,7 @@ pub struct Status {
     pub missing: Vec<Span>,
     /// Who is at work, and with which lock.
     pub owners: Vec<(String, Owner)>,
-    /// What is wrong with shards.
+    /// What is wrong with shards and tables.
     pub damaged: Problems,
 }
 
@@ -658,11 +658,12 @@ impl Status {
     }
 }
 
-/// Looks at a run without touching or locking it.
+/// Looks at a run without touching or locking it. Of shards and tables their first lines, names and
+/// sizes are read; with `verify` every byte, held against its digest.
 ///
 /// # Errors
 /// Input: no folder of a run. Damage: what says what it is cannot be read.
-pub fn status(folder: &Path) -> Result<Status, Problems> {
+pub fn status(folder: &Path, verify: bool) -> Result<Status, Problems> {
     let (finished, outline) = match look(folder)? {
         Found::Nothing => return Err(no_run(folder)),
         Found::Finished(manifest) => (true, manifest.run),
@@ -677,13 +678,20 @@ pub fn status(folder: &Path) -> Result<Status, Problems> {
     let mut damaged = Problems::default();
     // Tables of an extension's first part are as good as shards.
     let stored = Manifest::read(folder).ok().map(|manifest| manifest.run.definition.populations);
+    if stored.is_some() {
+        let looked = if verify { Run::open(folder).map(|_| ()) } else { Run::sizes(folder) };
+        looked.unwrap_or_else(|found| damaged.extend(found));
+    }
     let mut covered: Vec<Span> = stored.as_deref().map(pool::spans).unwrap_or_default();
     let mut done: u64 = covered.iter().map(|span| span.cases.end).sum();
     let (mut failed, mut unstable) = (0, 0);
     let identity = outline.identity();
     let place = folder.join(shard::FOLDER);
     for name in files::names(&place)?.into_iter().filter(|name| shard::is_name(name)) {
-        match Shard::open(&place.join(name), &outline, &identity) {
+        let shard = Shard::open(&place.join(name), &outline, &identity);
+        let shard =
+            shard.and_then(|shard| if verify { shard.verify() } else { Ok(()) }.map(|()| shard));
+        match shard {
             Ok(shard) => {
                 let span = Span { population: shard.population, cases: shard.header.cases };
                 let new = missing(std::slice::from_ref(&span), covered.iter().cloned());

@@ -1,13 +1,16 @@
-//! One results table being written: rows gathered to row groups, bytes digested on their way.
+//! One results table being written: rows gathered to blocks and row groups, bytes digested on their
+//! way.
 //!
-//! A row group ends where the caller says, so that the bytes depend on the rows alone.
+//! Both end where the caller says, so that the bytes depend on the rows alone.
 
 use super::column::{Buffer, Column};
 use super::files::Aside;
+use super::scratch::Scratch;
 use crate::problem::Problems;
 use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use arrow::record_batch::RecordBatch;
 use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::basic::Compression;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
@@ -17,6 +20,9 @@ use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
+
+/// Most rows of a page: one of every column is in memory.
+const PAGE_ROWS: usize = 2048;
 
 /// What a finished table holds.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,15 +35,17 @@ pub struct Content {
     pub blake3: String,
 }
 
-/// A table of record batches, each a row group, written to `W`.
+/// A table of record batches, each a block of a row group, written to `W`.
 pub struct Sheet<W: Write + Send = Aside> {
     schema: SchemaRef,
     writer: ArrowWriter<Digested<W>>,
+    scratch: Option<Scratch>,
     rows: u64,
 }
 
 impl<W: Write + Send> Sheet<W> {
-    /// A table of these columns with file-level metadata.
+    /// A table of these columns with file-level metadata; pages of the row group under way are in
+    /// `scratch`, or in memory.
     ///
     /// # Errors
     /// What the Parquet writer says.
@@ -45,6 +53,7 @@ impl<W: Write + Send> Sheet<W> {
         fields: Vec<Field>,
         metadata: &[(&str, String)],
         out: W,
+        scratch: Option<Scratch>,
     ) -> Result<Self, ParquetError> {
         let mut properties = WriterProperties::builder()
             .set_created_by(concat!("tvse ", env!("CARGO_PKG_VERSION")).to_owned())
@@ -53,6 +62,7 @@ impl<W: Write + Send> Sheet<W> {
             // Pages have no index: of a long table it would grow with the rows until the end.
             .set_statistics_enabled(EnabledStatistics::Chunk)
             .set_offset_index_disabled(true)
+            .set_data_page_row_count_limit(PAGE_ROWS)
             .set_max_row_group_row_count(None)
             .set_max_row_group_bytes(None);
         // Equal values are worth storing once where they are text, not where they are numbers.
@@ -65,8 +75,12 @@ impl<W: Write + Send> Sheet<W> {
         let properties = properties.set_key_value_metadata(Some(pairs.collect())).build();
         let schema = Arc::new(Schema::new(fields));
         let out = Digested { out, hasher: blake3::Hasher::new(), bytes: 0 };
-        let writer = ArrowWriter::try_new(out, schema.clone(), Some(properties))?;
-        Ok(Self { schema, writer, rows: 0 })
+        let mut options = ArrowWriterOptions::new().with_properties(properties);
+        if let Some(scratch) = &scratch {
+            options = options.with_page_store_factory(Arc::new(scratch.clone()));
+        }
+        let writer = ArrowWriter::try_new_with_options(out, schema.clone(), options)?;
+        Ok(Self { schema, writer, scratch, rows: 0 })
     }
 
     /// The columns.
@@ -74,14 +88,25 @@ impl<W: Write + Send> Sheet<W> {
         &self.schema
     }
 
-    /// Writes a row group.
+    /// Writes a block of the row group under way.
     ///
     /// # Errors
-    /// What the Parquet writer or the output says.
-    pub fn group(&mut self, rows: &RecordBatch) -> Result<(), ParquetError> {
-        self.writer.write(rows)?;
+    /// What the Parquet writer or the scratch file says.
+    pub fn block(&mut self, rows: &RecordBatch) -> Result<(), ParquetError> {
         self.rows += rows.num_rows() as u64;
-        self.writer.flush()
+        self.writer.write(rows)
+    }
+
+    /// Ends the row group, if it has rows.
+    ///
+    /// # Errors
+    /// What the Parquet writer, the scratch file or the output says.
+    pub fn end_group(&mut self) -> Result<(), ParquetError> {
+        self.writer.flush()?;
+        if let Some(scratch) = &self.scratch {
+            scratch.clear();
+        }
+        Ok(())
     }
 
     /// Ends the file and gives back the output with what it holds.
@@ -104,7 +129,8 @@ pub struct Table<R, W: Write + Send = Aside> {
 }
 
 impl<R, W: Write + Send> Table<R, W> {
-    /// A table of these columns with file-level metadata.
+    /// A table of these columns with file-level metadata; pages of the row group under way are in
+    /// `scratch`, or in memory.
     ///
     /// # Errors
     /// What the Parquet writer says.
@@ -112,8 +138,10 @@ impl<R, W: Write + Send> Table<R, W> {
         columns: Vec<Column<R>>,
         metadata: &[(&str, String)],
         out: W,
+        scratch: Option<Scratch>,
     ) -> Result<Self, ParquetError> {
-        let sheet = Sheet::new(columns.iter().map(Column::field).collect(), metadata, out)?;
+        let fields = columns.iter().map(Column::field).collect();
+        let sheet = Sheet::new(fields, metadata, out, scratch)?;
         let buffers = columns.iter().map(Buffer::new).collect();
         Ok(Self { columns, buffers, sheet, gathered: 0 })
     }
@@ -126,22 +154,31 @@ impl<R, W: Write + Send> Table<R, W> {
         self.gathered += 1;
     }
 
-    /// Rows gathered for the row group under way.
+    /// Rows gathered for the block under way.
     pub fn gathered(&self) -> u64 {
         self.gathered
     }
 
-    /// Ends the row group, if it has rows, and writes it.
+    /// Ends the block, if it has rows, and writes it.
     ///
     /// # Errors
-    /// What the Parquet writer or the output says.
-    pub fn end_group(&mut self) -> Result<(), ParquetError> {
+    /// As [`Sheet::block`].
+    pub fn end_block(&mut self) -> Result<(), ParquetError> {
         if self.gathered == 0 {
             return Ok(());
         }
         let arrays = self.buffers.iter_mut().zip(&self.columns).map(|(b, c)| b.finish(c)).collect();
         self.gathered = 0;
-        self.sheet.group(&RecordBatch::try_new(self.sheet.schema().clone(), arrays)?)
+        self.sheet.block(&RecordBatch::try_new(self.sheet.schema().clone(), arrays)?)
+    }
+
+    /// Ends the row group, if it has rows, and writes it.
+    ///
+    /// # Errors
+    /// As [`Sheet::end_group`].
+    pub fn end_group(&mut self) -> Result<(), ParquetError> {
+        self.end_block()?;
+        self.sheet.end_group()
     }
 
     /// Ends the file and gives back the output with what it holds.

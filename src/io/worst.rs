@@ -49,7 +49,7 @@ pub fn write(
     let json = serde_json::to_string_pretty(found).expect("numbers and names");
     let mut all = vec![(PathBuf::from(FILE), (json + "\n").into_bytes())];
     all.extend(texts.into_iter().map(|(name, text)| (PathBuf::from(name), text.into_bytes())));
-    folder::write(target, &all, Some(FILE).filter(|_| target.exists()))?;
+    folder::write(target, &all, Some(FILE).filter(|_| target.exists()), &[])?;
     Ok(all.into_iter().map(|(name, _)| target.join(name)).collect())
 }
 

@@ -11,7 +11,7 @@ use crate::vehicle::{
     Bearing, Electrohydraulic, Law, SecondOrder, StateSpace, StateSpaceActuator, TransferActuator,
     TransferFunction,
 };
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -163,9 +163,14 @@ fn transfer_function(
 fn held(key: &str, system: &StateSpace, findings: &mut Findings) -> bool {
     let poles = system.poles();
     let unstable = poles.iter().flatten().find(|pole| pole.norm() != 0.0 && !(pole.re < 0.0));
+    // Numbers so large that a response overflows are no actuator's.
+    let response = system.response(Complex::new(0.0, 1.0));
+    let finite =
+        response.is_some_and(|all| all.iter().all(|x| x.re.is_finite() && x.im.is_finite()));
     let found = match (&poles, unstable) {
         (None, _) => "poles that cannot be found".to_owned(),
         (_, Some(pole)) => format!("a pole at {pole} rad/s"),
+        _ if !finite => "a response at 1 rad/s that is not finite".to_owned(),
         _ => return true,
     };
     findings.push(key, found, "poles in the open left half plane or at zero, the nozzle held");

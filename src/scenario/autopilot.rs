@@ -7,12 +7,13 @@ use super::autopilot_file::{
 };
 use super::table::Findings;
 use super::{names, pattern};
+use crate::dynamics::interconnection::{Block, Interconnection};
 use crate::spelling::allowed_instead;
 use crate::vehicle::{
     Allocation, Autopilot, Axis, Engine, Filter, FilterKind, ModeSet, Path, Sensor, SensorKind,
-    Tank, TransferFunction, autopilot,
+    StateSpace, Tank, TransferFunction, autopilot,
 };
-use nalgebra::Vector3;
+use nalgebra::{Complex, DMatrix, Vector3};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -36,7 +37,9 @@ pub fn resolve(
     let paths: Option<Vec<Path>> = paths.into_iter().collect();
     if let Some(paths) = &paths {
         unread(paths, findings);
-        algebraic_loops(paths, findings);
+        if !algebraic_loops(paths, findings) {
+            unstable_loops(paths, findings);
+        }
     }
     let allocation = body.and_then(|body| allocation(&file.allocation, body, sets, findings));
     Some(Autopilot {
@@ -196,15 +199,12 @@ fn unread(paths: &[Path], findings: &mut Findings) {
     }
 }
 
-/// Paths that read themselves without a filter between that has no direct feedthrough.
-fn algebraic_loops(paths: &[Path], findings: &mut Findings) {
-    let direct = |path: &Path| {
-        path.filters.iter().all(|f| f.kind.state_space(&f.kind.nominal()).d[(0, 0)] != 0.0)
-    };
-    let direct: Vec<bool> = paths.iter().map(direct).collect();
+/// Paths that read each other, in groups; those alone are considered that `counts` says.
+fn loops(paths: &[Path], counts: impl Fn(&Path) -> bool) -> Vec<Vec<usize>> {
+    let counts: Vec<bool> = paths.iter().map(counts).collect();
     let reads = |i: usize, j: usize| {
         let mut inputs = paths[i].input.iter();
-        direct[i] && direct[j] && inputs.any(|(signal, _)| *signal == paths[j].signal())
+        counts[i] && counts[j] && inputs.any(|(signal, _)| *signal == paths[j].signal())
     };
     let all = 0..paths.len();
     // Which path depends on which, over any number of others.
@@ -218,14 +218,72 @@ fn algebraic_loops(paths: &[Path], findings: &mut Findings) {
             }
         }
     }
-    for first in all.clone().filter(|&i| depends[i][i]) {
-        let members: Vec<usize> =
-            all.clone().filter(|&j| depends[first][j] && depends[j][first]).collect();
-        if members[0] == first {
-            let names: Vec<String> = members.iter().map(|&i| paths[i].signal()).collect();
-            let found = format!("an algebraic loop through {}", names.join(", "));
-            let allowed = "paths without a loop, or with a filter in it of more poles than zeros";
-            findings.push(format!("autopilot.path[{first}].input"), found, allowed);
+    let group = |first: usize| -> Vec<usize> {
+        all.clone().filter(|&j| depends[first][j] && depends[j][first]).collect()
+    };
+    let groups = all.clone().filter(|&i| depends[i][i]).map(|first| (first, group(first)));
+    groups.filter(|(first, group)| group[0] == *first).map(|(_, group)| group).collect()
+}
+
+fn signals(paths: &[Path], group: &[usize]) -> String {
+    group.iter().map(|&i| paths[i].signal()).collect::<Vec<_>>().join(", ")
+}
+
+/// Paths that read themselves without a filter between that has no direct feedthrough; whether there
+/// are any.
+fn algebraic_loops(paths: &[Path], findings: &mut Findings) -> bool {
+    let direct = |path: &Path| {
+        path.filters.iter().all(|f| f.kind.state_space(&f.kind.nominal()).d[(0, 0)] != 0.0)
+    };
+    let groups = loops(paths, direct);
+    for group in &groups {
+        let found = format!("an algebraic loop through {}", signals(paths, group));
+        let allowed = "paths without a loop, or with a filter in it of more poles than zeros";
+        findings.push(format!("autopilot.path[{}].input", group[0]), found, allowed);
+    }
+    !groups.is_empty()
+}
+
+/// Loops of paths that are unstable with all sensors at zero: like an unstable filter they would give
+/// commands of their own, whatever the vehicle does.
+fn unstable_loops(paths: &[Path], findings: &mut Findings) {
+    for group in loops(paths, |_| true) {
+        let mut blocks = Vec::new();
+        let mut systems = Vec::new();
+        for path in group.iter().map(|&i| &paths[i]) {
+            let inside = |signal: &String| group.iter().any(|&j| paths[j].signal() == *signal);
+            let (inputs, weights): (Vec<_>, Vec<_>) =
+                path.input.iter().filter(|(signal, _)| inside(signal)).cloned().unzip();
+            let weights = DMatrix::from_row_slice(1, weights.len(), &weights) * path.gain;
+            let system = path.filters.iter().fold(StateSpace::gain(weights), |system, filter| {
+                system.then(&filter.kind.state_space(&filter.kind.nominal()))
+            });
+            blocks.push(Block {
+                name: path.name.clone(),
+                inputs,
+                outputs: vec![path.signal()],
+                states: vec![path.name.clone(); system.order()],
+            });
+            systems.push(system);
+        }
+        let connected = Interconnection::new(&blocks, Vec::new(), Vec::new());
+        let whole = connected.expect("signals of the group").compose(&systems);
+        let poles = whole.as_ref().ok().and_then(|whole| whole.poles().zip(Some(&whole.a)));
+        let found = match poles {
+            // Computed eigenvalues are those of a matrix within a few n ε ‖A‖ of this one.
+            Some((poles, a)) => poles
+                .into_iter()
+                .find(|pole| !(pole.re <= 8.0 * a.nrows() as f64 * f64::EPSILON * a.norm())),
+            None => Some(Complex::new(f64::NAN, 0.0)),
+        };
+        if let Some(pole) = found {
+            let place = match pole.re.is_nan() {
+                true => "poles that cannot be found".to_owned(),
+                false => format!("a pole at {pole} rad/s"),
+            };
+            let found = format!("a loop through {} with {place}", signals(paths, &group));
+            let allowed = "loops of paths that are stable by themselves, all sensors at zero";
+            findings.push(format!("autopilot.path[{}].input", group[0]), found, allowed);
         }
     }
 }
@@ -265,6 +323,11 @@ fn allocation(
     let gimbals: Vec<(usize, usize)> =
         all.iter().filter(|(_, name)| chosen(name)).map(|(place, _)| *place).collect();
     if !good {
+        return None;
+    }
+    if let (Some(_), Some(time)) = (&file.matrix, file.time_s) {
+        let found = format!("{time} s beside `matrix`, which does not depend on it");
+        findings.push("autopilot.allocation.time_s", found, "one of both");
         return None;
     }
     let matrix = match &file.matrix {

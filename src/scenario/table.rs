@@ -141,8 +141,24 @@ impl<'a> Reader<'a> {
                 }
             }
             _ => {
-                let found = describe(value);
-                self.refuse(schema, value, key, found);
+                let tag = value.as_table().zip(self.tags(schema).first().copied());
+                let Some((table, (tag, _))) = tag else {
+                    let found = describe(value);
+                    return self.refuse(schema, value, key, found);
+                };
+                // A tagged table without one of the tags.
+                let words = self.tags(schema).into_iter().map(|(_, word)| word);
+                let (found, allowed) = match table.get(tag) {
+                    Some(Value::String(word)) => {
+                        (format!("\"{word}\""), spelling::allowed_instead(word, words))
+                    }
+                    other => {
+                        let all = words.collect::<Vec<_>>().join(", ");
+                        (other.map_or("nothing".into(), describe), format!("one of {all}"))
+                    }
+                };
+                *value = self.placeholder(schema);
+                self.problem_unread(&format!("{key}.{tag}"), found, allowed);
             }
         }
     }
@@ -265,15 +281,23 @@ impl<'a> Reader<'a> {
         text.trim_end().into()
     }
 
-    /// The tags of a tagged enum.
-    fn variants(&self, schema: &'a Json) -> String {
+    /// The tags of a tagged enum, key and word.
+    fn tags(&self, schema: &'a Json) -> Vec<(&'a str, &'a str)> {
         let tags = alternatives(schema).into_iter().flat_map(|a| {
             let properties = self.resolve(a)["properties"].as_object();
-            properties.into_iter().flatten().filter_map(|(name, p)| {
-                p["const"].as_str().map(|tag| format!("{name} = \"{tag}\""))
-            })
+            properties
+                .into_iter()
+                .flatten()
+                .filter_map(|(name, p)| p["const"].as_str().map(|word| (name.as_str(), word)))
         });
-        format!("a table with one of {}", tags.collect::<Vec<_>>().join(", "))
+        tags.collect()
+    }
+
+    /// The tags of a tagged enum in words.
+    fn variants(&self, schema: &'a Json) -> String {
+        let tags = self.tags(schema).into_iter();
+        let tags: Vec<_> = tags.map(|(name, word)| format!("{name} = \"{word}\"")).collect();
+        format!("a table with one of {}", tags.join(", "))
     }
 
     /// A value that fits the schema, to stand for one that could not be read.
@@ -426,7 +450,7 @@ mod tests {
                 "part[0].mass_kg",
                 "part[0].shape",
                 "part[1].direction",
-                "part[1].law",
+                "part[1].law.kind",
                 "part[1].mass_kg",
                 "part[2].direction",
                 "part[2].law.hihg",
@@ -440,7 +464,8 @@ mod tests {
         assert_eq!(found[3].1, "text \"y\"");
         assert_eq!(found[5].2, "a finite number > 0");
         assert_eq!(found[7].2, "a list of 3, each a finite number");
-        assert!(found[8].2.contains("kind = \"uniform\""), "{:?}", found[8]);
+        assert_eq!(found[8].1, "\"unifrom\"");
+        assert!(found[8].2.contains("did you mean `uniform`?"), "{:?}", found[8]);
         assert_eq!(found[14].1, "nothing");
     }
 

@@ -316,7 +316,58 @@ fn the_pair_is_the_three_dimensional_model_of_one_engine_and_one_mode() {
     }
 }
 
+#[test]
+fn the_factors_of_a_quartic_multiply_to_it_or_are_refused() {
+    let product =
+        |[b, c]: [f64; 2], [d, e]: [f64; 2]| [c * e, b * e + d * c, c + e + b * d, b + d, 1.0];
+    // Complex with complex, real with complex, real with real, unstable; from a tenth beside.
+    let pairs = [
+        ([0.01, 1.0], [0.7, 1.4]),
+        ([3.0, 0.5], [0.02, 2.0]),
+        ([3.0, 0.5], [5.0, 0.8]),
+        ([-0.1, 1.0], [0.4, 1.0]),
+    ];
+    for (first, second) in pairs {
+        let monic = product(first, second);
+        let found = factors(&monic, [first.map(|x| 1.1 * x), second.map(|x| 0.9 * x)]).unwrap();
+        for (found, expected) in found.into_iter().zip([first, second]) {
+            // The resultants are of the order of one.
+            assert!((0..2).all(|i| (found[i] - expected[i]).abs() < 1e-13), "{found:?}");
+        }
+        for root in found.map(roots).into_iter().flatten() {
+            let value = monic.iter().rev().fold(Complex::<f64>::ZERO, |p, a| p * root + a);
+            assert!(value.norm() < 1e-13 * (1.0 + root.norm()).powi(4), "{root}");
+        }
+    }
+    // Where both factors are the same the steps have no direction.
+    assert_eq!(factors(&product([0.1, 1.0], [0.3, 1.2]), [[0.2, 1.0]; 2]), None);
+    assert_eq!(factors(&[f64::NAN; 5], [[0.2, 1.0], [0.1, 2.0]]), None);
+}
+
 proptest! {
+    #[test]
+    fn the_poles_are_the_eigenvalues_of_the_companion_matrix(
+        zeta_n in 0.0..1.5_f64, omega_n in 0.2..5.0_f64, zeta_b in 0.0..0.1_f64,
+        coupling in -0.95..0.95_f64, shape in -1.0..1.0_f64, thrust_n in 0.0..5.0_f64,
+    ) {
+        let planar = Planar::new(Parameters {
+            actuator_damping_ratio: zeta_n, actuator_omega_rad_s: omega_n,
+            mode_damping_ratio: zeta_b, coupling, shape, ..reference(thrust_n)
+        }).unwrap();
+        let a = planar.quartic();
+        let monic = a.map(|x| x / a[4]);
+        let expected = eigenvalues(&monic).unwrap();
+        let size = expected.iter().map(|p| p.norm()).fold(1.0, f64::max);
+        for pole in planar.poles().unwrap() {
+            let nearest = expected.iter().map(|p| (p - pole).norm()).fold(f64::MAX, f64::min);
+            // A double root moves by the square root of the rounding.
+            prop_assert!(nearest < 1e-6 * size, "{}", pole);
+            let value = monic.iter().rev().fold(Complex::<f64>::ZERO, |p, a| p * pole + a);
+            let terms = monic.iter().zip(0..).map(|(a, i)| a.abs() * pole.norm().powi(i));
+            prop_assert!(value.norm() < 32.0 * f64::EPSILON * terms.sum::<f64>());
+        }
+    }
+
     #[test]
     fn the_routh_verdict_agrees_with_the_poles_and_the_critical_thrust(
         zeta_n in 0.001..1.2_f64, omega_n in 0.2..5.0_f64, zeta_b in 0.0001..0.1_f64,

@@ -55,7 +55,7 @@ fn a_run_that_was_stopped_goes_on_and_has_the_bytes_of_one_that_was_not() {
         let run = folder.path().join(format!("run-{index}"));
         stopped(&run, 30 + 100 * index);
         assert!(Run::open(&run).unwrap_err().to_string().contains("unfinished"));
-        let before: u64 = status(&run).unwrap().done;
+        let before: u64 = status(&run, false).unwrap().done;
         assert!(before > 30 && before < 371);
         // Stopped again, and nothing that is finished is evaluated again.
         let again = Opening::Resume { cases: true };
@@ -116,7 +116,7 @@ fn parts_in_any_order_and_number_give_the_same_bytes_and_repeat_without_work() {
             synthetic::part(&run, outline(), Part { number, of }).unwrap();
         }
         let left = Store::gather(&run, &[]).unwrap().missing();
-        for number in status(&run).unwrap().parts_left(of) {
+        for number in status(&run, false).unwrap().parts_left(of) {
             synthetic::part(&run, outline(), Part { number, of }).unwrap();
         }
         assert_eq!(left.is_empty(), of % 2 == 0 || of == 1, "{left:?}");
@@ -199,9 +199,12 @@ fn corrupted_truncated_swapped_and_renamed_shards_are_found_by_name_and_evaluate
         let foreign = other.join(all[3].strip_prefix(&run).unwrap());
         damage(&all[3], &all[4], &foreign);
         let name = files::name(&all[3]);
-        let damaged = status(&run).unwrap().damaged.to_string();
-        // Bytes behind the header are not read for a status.
+        let damaged = status(&run, false).unwrap().damaged.to_string();
+        // Bytes behind the header are read where it is asked for.
         assert_eq!(damaged.contains(&name), what != "bytes", "{what}: {damaged}");
+        let verified = status(&run, true).unwrap();
+        assert!(verified.damaged.to_string().starts_with(&name), "{what}: {}", verified.damaged);
+        assert_eq!(verified.missing.len(), 1, "{what}");
         let problems = Store::gather(&run, &[]).unwrap_err();
         assert_eq!((problems.kind(), problems.0.len()), (Kind::Damage, 1), "{what}: {problems}");
         assert!(problems.to_string().starts_with(&name), "{what}: {problems}");
@@ -214,6 +217,24 @@ fn corrupted_truncated_swapped_and_renamed_shards_are_found_by_name_and_evaluate
         assert_eq!(tables(&run), expected, "{what}");
         fs::remove_dir_all(&run).unwrap();
     }
+}
+
+#[test]
+fn a_damaged_table_of_a_finished_run_is_seen_from_outside() {
+    let (folder, _) = plain();
+    let run = folder.path().join("plain");
+    assert!(status(&run, true).unwrap().damaged.0.is_empty());
+    let table = run.join(TableName::Modes.file());
+    let mut bytes = fs::read(&table).unwrap();
+    bytes[1000] ^= 1;
+    fs::write(&table, &bytes).unwrap();
+    assert!(status(&run, false).unwrap().damaged.0.is_empty());
+    let found = status(&run, true).unwrap().damaged;
+    assert!(found.to_string().contains("modes.parquet: found BLAKE3"), "{found}");
+    fs::write(&table, &bytes[1..]).unwrap();
+    fs::remove_file(run.join(TableName::Worst.file())).unwrap();
+    let found = status(&run, false).unwrap().damaged;
+    assert_eq!((found.kind(), found.0.len()), (Kind::Damage, 2), "{found}");
 }
 
 fn copy(from: &Path, to: &Path) {
@@ -454,7 +475,7 @@ fn one_process_at_a_time_works_on_a_run_and_parts_only_on_their_own() {
         assert!(text.contains("held by"), "{text}");
     }
     let at_work: Vec<String> =
-        status(&run).unwrap().owners.into_iter().map(|(name, _)| name).collect();
+        status(&run, false).unwrap().owners.into_iter().map(|(name, _)| name).collect();
     assert_eq!(at_work, ["lock-1-of-3", "lock-2-of-3"]);
     drop((first, second));
     let whole = Store::gather(&run, &[]).unwrap();

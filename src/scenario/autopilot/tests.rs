@@ -177,6 +177,14 @@ fn what_is_wrong_with_an_autopilot_is_said_with_its_key() {
             "autopilot.allocation.time_s",
             "80.0",
         ),
+        (
+            "gimbals = [\"booster.*.*\"]",
+            "gimbals = [\"booster.*.*\"]\ntime_s = 80.0\nmatrix = [[1.0, 0.0, 0.0]]",
+            "autopilot.allocation.time_s",
+            "one of both",
+        ),
+        ("kind = \"notch\"", "kind = \"nothc\"", "autopilot.path[1].filter[0].kind", "`notch`"),
+        ("kind = \"notch\", ", "", "autopilot.path[1].filter[0].kind", "one of gain, lag,"),
     ] {
         if key.is_empty() {
             // A low pass in the loop: nothing is passed on at once.
@@ -206,6 +214,13 @@ fn paths_that_read_each_other_at_once_are_an_algebraic_loop() {
         );
     // The transfer function of the rate path has no direct feedthrough: no loop.
     assert!(read(&loops).is_ok());
+    // With more than one at zero frequency around it the loop runs away, stable as each filter is.
+    let away = loops.replacen("\"path.other\" = 0.5", "\"path.other\" = 2.0", 1);
+    let list = read(&away).unwrap_err().0;
+    assert_eq!((list.len(), list[0].key.as_str()), (1, "autopilot.path[1].input"));
+    let told = "a loop through path.roll_rate, path.other with a pole at ";
+    assert!(list[0].found.starts_with(told), "{}", list[0].found);
+    assert!(read(&away.replacen("= 2.0", "= -2.0", 1)).is_ok());
     let direct = loops.replacen("denominator = [0.01, 0.3, 1.0]", "denominator = [0.3, 1.0]", 1);
     let list = read(&direct).unwrap_err().0;
     assert_eq!((list.len(), list[0].key.as_str()), (1, "autopilot.path[1].input"));
