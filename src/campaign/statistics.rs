@@ -8,8 +8,9 @@ use super::sample::{CONFIDENCE, Sample, ends, known};
 use super::summary::LEVELS;
 use crate::dispersion::keyed::Key;
 use crate::stats::{
-    Bootstrap, BootstrapInterval, Confidence, Drawing, Error, Estimate, Independent, Moments,
-    Ordered, PairedDifference, Probability, Sides, checkpoints, clopper_pearson, of_replicates,
+    BEYOND_EACH, Bootstrap, BootstrapInterval, Confidence, Drawing, Error, Estimate, Independent,
+    Moments, Ordered, PairedDifference, Probability, Sides, checkpoints, clopper_pearson,
+    of_replicates, of_sections,
 };
 
 /// BLAKE3 context of the words that choose resamples.
@@ -81,7 +82,8 @@ const BEYOND: f64 = 20.0;
 
 /// Moments and quantiles of the cases that have a value. Independent cases: bias-corrected and
 /// accelerated bootstrap (quantiles where 20 values are expected beyond them), and for quantiles the
-/// exact order statistics too; replicates: Student's t over their results; else no interval.
+/// exact order statistics too; replicates: Student's t over their results, of other statistics than the mean about that
+/// of all cases, quantiles where each has [`BEYOND_EACH`] values beyond them; else no interval.
 ///
 /// # Errors
 /// A number of resamples below 200; values that are infinite.
@@ -117,8 +119,19 @@ pub fn estimates(
                 if !whole || parts.iter().any(Vec::is_empty) {
                     return Err(Error::TooFew { found: 0, needed: 1 });
                 }
+                let fewest = parts.iter().map(Vec::len).min().unwrap_or(0) as f64;
+                if level.is_some_and(|level| !(fewest * level.min(1.0 - level) >= BEYOND_EACH)) {
+                    return Err(Error::Undefined(
+                        "too few values beyond the quantile in a replicate",
+                    ));
+                }
                 let results: Vec<f64> = parts.iter_mut().map(|part| of(part)).collect();
-                of_replicates(&results, confidence, independent)
+                match value {
+                    Some(whole) if statistic != "mean" => {
+                        of_sections(whole, &results, confidence, independent)
+                    }
+                    _ => of_replicates(&results, confidence, independent),
+                }
             };
             lines.push(line().with(estimate()));
             continue;
@@ -253,6 +266,22 @@ mod tests {
         let width = 2.0 * 1.96 * (1.0_f64 / 12.0 / 500.0).sqrt();
         assert!(((mean[1] - mean[0]) / width - 1.0).abs() < 0.15);
         assert_eq!(lines, estimates(Sample::INDEPENDENT, &values(500), 400, (3, "m")).unwrap());
+    }
+
+    #[test]
+    fn quantiles_over_replicates_are_about_that_of_all_cases_or_have_no_interval() {
+        let sample = Sample::turns(Drawing::LatinHypercube, 4);
+        let lines = estimates(sample, &values(400), 400, (3, "m")).unwrap();
+        for (level, word) in LEVELS {
+            let line = find(&lines, word, "replicates");
+            // A hundred values in each: five beyond the levels 5 % and 95 %.
+            assert_eq!(line.is_some(), (0.05..=0.95).contains(&level), "{word}");
+            if let Some(Line { value: Some(value), interval: Some([low, high]), .. }) = line {
+                assert!((0.5 * (low + high) - value).abs() < 1e-12 && low < value, "{word}");
+            }
+        }
+        let mean = find(&lines, "mean", "replicates").unwrap().interval.unwrap();
+        assert!(mean[0] < 0.5 && 0.5 < mean[1]);
     }
 
     #[test]

@@ -8,8 +8,8 @@ use super::definition::Definition;
 use super::nested::{Nested, OuterDraws, Statement};
 use super::sample::{CONFIDENCE, Intervals, Sample, ends};
 use crate::stats::{
-    Confidence, Drawing, Error, Moments, Probability, RunningMoments, Selection, Sides,
-    clopper_pearson, interval_ranks, of_replicates, quantile_of,
+    BEYOND_EACH, Confidence, Drawing, Error, Moments, Probability, RunningMoments, Selection,
+    Sides, clopper_pearson, interval_ranks, of_replicates, of_sections, quantile_of,
 };
 use std::f64::consts::LN_2;
 
@@ -276,6 +276,20 @@ impl Tally {
         of_replicates(&values, confidence, independent).ok().map(ends)
     }
 
+    /// The interval of a quantile over replicates, about that of all cases.
+    fn quantile_over_replicates(&self, level: Probability) -> Option<[f64; 2]> {
+        let fewest = self.replicates.iter().map(|tally| tally.order.count()).min()? as f64;
+        if !(fewest * level.get().min(1.0 - level.get()) >= BEYOND_EACH) {
+            return None;
+        }
+        let each: Option<Vec<f64>> =
+            self.replicates.iter().map(|tally| tally.quantile(level)).collect();
+        let (each, whole) = (each?, self.quantile(level)?);
+        let independent = self.sample.drawing().independent_replicates(each.len() as u64).ok()?;
+        let confidence = Confidence::new(CONFIDENCE).ok()?;
+        of_sections(whole, &each, confidence, independent).ok().map(ends)
+    }
+
     /// The interval of a mean: `place` is its place in [`Tally::means`].
     fn mean_interval(&self, moments: Moments, place: usize) -> Option<[f64; 2]> {
         if let Ok(independent) = self.sample.drawing().independent() {
@@ -356,8 +370,7 @@ impl Tally {
         } else if !self.replicates.is_empty() {
             for (interval, (level, _)) in intervals.iter_mut().zip(LEVELS) {
                 let level = Probability::new(level)?;
-                let each = self.replicates.iter().map(|tally| tally.quantile(level));
-                *interval = self.over_replicates(each.collect());
+                *interval = self.quantile_over_replicates(level);
             }
         }
         Ok(intervals)

@@ -206,7 +206,7 @@ pub const METHODS: [Assumed; 7] = [
     assumed(
         "replicates",
         "Student's t over the results of independent replicates or outer draws",
-        "Replicates independent of each other and near normal in their result; two at least, more for a useful width.",
+        "Replicates independent of each other and near normal in their result; two at least, more for a useful width. Quantiles, deviation, skewness and kurtosis: about the value of all cases (sectioning), quantiles only where each replicate has five cases beyond them.",
     ),
     assumed(
         "bootstrap_percentile",

@@ -179,6 +179,30 @@ fn intervals_from_replicates_cover_about_as_often_as_they_say() {
 }
 
 #[test]
+fn intervals_of_quantiles_over_replicates_cover_about_as_often_as_they_say() {
+    // The 5 % point of u + v over replicates of 100 strata of u, five values beyond it in each: √0.1.
+    let level = Probability::new(0.05).unwrap();
+    let quantile = |values: &[f64]| Ordered::new(values).unwrap().quantile(level);
+    for (seed, replicates) in [(61, 4), (62, 8), (63, 30)] {
+        let independent = Drawing::LatinHypercube.independent_replicates(replicates).unwrap();
+        let mut uniform = uniforms(seed);
+        let trials = 2000;
+        let misses = (0..trials).filter(|_| {
+            let mut replicate = |_| -> Vec<f64> {
+                (0..100).map(|i| (f64::from(i) + uniform()) / 100.0 + uniform()).collect()
+            };
+            let parts: Vec<Vec<f64>> = (0..replicates).map(&mut replicate).collect();
+            let values: Vec<f64> = parts.iter().map(|part| quantile(part)).collect();
+            let whole = quantile(&parts.concat());
+            let found = of_sections(whole, &values, confidence(0.9), independent).unwrap();
+            !(found.lower() <= 0.1_f64.sqrt() && 0.1_f64.sqrt() <= found.upper())
+        });
+        // Approximate by design, within three hundredths.
+        assert_misses_near(misses.count() as u64, trials, 0.1, 0.03);
+    }
+}
+
+#[test]
 fn bootstrap_intervals_of_mean_deviation_and_median_cover_about_as_often_as_they_say() {
     // Uniform values: mean 1/2, deviation 1/√12, median 1/2. The bootstrap is approximate: its
     // coverage at n = 60 is known to be a few percent off, which the slack allows for.

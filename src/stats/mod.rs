@@ -32,7 +32,7 @@ pub use paired::PairedDifference;
 pub use probability::{Confidence, Probability};
 pub use proportion::{clopper_pearson, rejects_at_least, rejects_at_most};
 pub use quantile::{Ordered, interval_ranks, quantile_of};
-pub use replicates::of_replicates;
+pub use replicates::{BEYOND_EACH, of_replicates, of_sections};
 pub use selection::Selection;
 pub use tolerance::{
     Tails, ToleranceBound, ToleranceInterval, consumers_risk, least_cases, most_exceedances,
