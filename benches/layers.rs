@@ -8,8 +8,9 @@ use tvse::dispersion::Sampler;
 use tvse::dynamics::{Feedback, Model};
 use tvse::io::scenario::Reach;
 use tvse::margins::Settings;
+use tvse::modal::Solver;
+use tvse::modal::identify::{self, Solved};
 use tvse::modal::spectrum::{Base, Spectrum};
-use tvse::modal::{Solver, identify};
 use tvse::structure::{self, Selection, Stick};
 use tvse::vehicle::Vehicle;
 
@@ -118,16 +119,9 @@ fn layers(criterion: &mut Criterion) {
         let mut scratch = Model::zeros(model.coordinates());
         group.bench_function(id("identify"), |b| {
             b.iter(|| {
-                identify::identify(
-                    &mut solver,
-                    reference,
-                    nominal,
-                    &model,
-                    &poles,
-                    0.5,
-                    &mut scratch,
-                )
-                .expect("identified")
+                let mut case = Solved::new(&model, &poles);
+                identify::identify(&mut solver, reference, nominal, &mut case, 0.5, &mut scratch)
+                    .expect("identified")
             });
         });
         let mut case = 0;

@@ -14,9 +14,9 @@ use nalgebra::Complex;
 pub struct Audit {
     /// Cases solved both ways.
     pub cases: usize,
-    /// Evaluations of these that both solved and one certified by discs.
+    /// Evaluations of these that one solver certified by discs and the other solved too.
     pub evaluations: usize,
-    /// Of all evaluations, those that the dense solver had to answer in the structured run too.
+    /// Evaluations without certificate, which the dense solver answered both ways.
     pub fallbacks: usize,
     /// Poles compared.
     pub poles: usize,
@@ -86,9 +86,12 @@ pub fn audit(
             match (&ours.outcome, &theirs.outcome) {
                 (Ok(poles), Ok(others)) => {
                     let solver = ours.solution.map(|solution| solution.solver);
-                    audit.fallbacks += usize::from(solver != Some(Solver::Structured));
-                    audit.evaluations += 1;
-                    audit.compare(poles, others, place);
+                    if solver == Some(Solver::Structured) {
+                        audit.evaluations += 1;
+                        audit.compare(poles, others, place);
+                    } else {
+                        audit.fallbacks += 1;
+                    }
                 }
                 (Err(_), Err(_)) => {}
                 (Ok(_), Err(failure)) | (Err(failure), Ok(_)) => {

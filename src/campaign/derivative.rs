@@ -6,7 +6,7 @@
 
 use super::draw::Slots;
 use super::draw::gradient::Back;
-use crate::dispersion::{AffineGradient, Dispersion, Draws};
+use crate::dispersion::{Affine, AffineGradient, Chain, Parameters};
 use crate::dynamics::gradient::C;
 use crate::dynamics::{DrawnVehicle, Effects, Plant, Vectors};
 use crate::modal::Reference;
@@ -33,7 +33,10 @@ impl Sensitivity {
     /// From the derivatives of a `pole`.
     pub fn new(pole: C, by_score: &[Option<C>], curvature: Option<f64>) -> Self {
         Self {
-            damping_ratio: by_score.iter().map(|by| by.map(|by| damping(pole, by))).collect(),
+            damping_ratio: {
+                let cube = pole.norm().powi(3);
+                by_score.iter().map(|by| by.map(|by| damping_over(pole, cube, by))).collect()
+            },
             real_part_rad_s: by_score.iter().map(|by| by.map(|by| by.re)).collect(),
             curvature,
         }
@@ -47,27 +50,33 @@ impl Sensitivity {
 
 /// Change of the damping ratio −σ/|λ| of `pole` for the change `by` of the pole: −ω (ω dσ − σ dω)/|λ|³.
 pub fn damping(pole: C, by: C) -> f64 {
-    pole.im * (pole.re * by.im - pole.im * by.re) / pole.norm().powi(3)
+    damping_over(pole, pole.norm().powi(3), by)
+}
+
+fn damping_over(pole: C, cube: f64, by: C) -> f64 {
+    pole.im * (pole.re * by.im - pole.im * by.re) / cube
 }
 
 /// Where derivatives are taken.
 pub struct Place<'a> {
     /// The vehicle.
     pub vehicle: &'a Vehicle,
-    /// The dispersion.
-    pub dispersion: &'a Dispersion,
+    /// Its parameters.
+    pub parameters: &'a Parameters,
     /// Per parameter, whether a draw acts on it.
     pub acts: &'a [bool],
+    /// Per engine, whether a draw acts on one of its parameters.
+    pub engines: &'a [bool],
     /// From draws to the drawn vehicle at the flight time.
     pub slots: &'a Slots,
     /// The plant of the variant.
     pub plant: &'a Plant,
     /// What acts.
     pub effects: &'a Effects,
-    /// The draws.
-    pub draws: &'a Draws,
-    /// Draws that are held at a value.
-    pub fixed: &'a [(usize, f64)],
+    /// Effect on each parameter.
+    pub draws: &'a [Affine],
+    /// From these to the scores; empty where no derivative is asked for.
+    pub chain: &'a Chain<'a>,
     /// The drawn vehicle.
     pub drawn: &'a DrawnVehicle,
 }
@@ -102,23 +111,24 @@ impl Place<'_> {
         let back = self.form_by_score(s, near, pole);
         let scale = pole.derivative() * near.derivative() * (s - near.pair.pole);
         let both = there.into_iter().zip(back);
-        both.filter_map(|(a, b)| Some((a? * b? / scale).norm_sqr())).sum()
+        both.filter_map(|(a, b)| Some((a? * b?).norm_sqr())).sum::<f64>() / scale.norm_sqr()
     }
 
     /// Gradient of yᴴ L(s) x by the scores, y of `left` and x of `right`.
     fn form_by_score(&self, s: C, left: &Reference, right: &Reference) -> Vec<Option<C>> {
         let conjugate: Vec<C> = left.pair.left.iter().map(|z| z.conj()).collect();
         let vectors = Vectors { s, left: &conjugate, right: &right.pair.right };
-        let gradient = self.plant.gradient(self.drawn, self.effects, &vectors);
+        let gradient = self.plant.gradient(self.drawn, self.effects, &vectors, self.engines);
         let effects: Vec<AffineGradient> = self.slots.pull(&Back {
             vehicle: self.vehicle,
-            parameters: self.dispersion.parameters(),
-            effects: &self.draws.effects,
+            parameters: self.parameters,
+            effects: self.draws,
             acts: self.acts,
+            engines: self.engines,
             plant: self.plant,
             drawn: self.drawn,
             gradient: &gradient,
         });
-        self.dispersion.score_gradient(self.draws, self.fixed, &effects)
+        self.chain.gradient(&effects)
     }
 }

@@ -12,11 +12,12 @@ use super::record::{Certificate, Solution};
 use super::{
     Branch, Definition, Evaluation, Failure, FailureKind, Pole, Population, Record, Variant,
 };
-use crate::dispersion::{Affine, Cursor, Dispersion, Draws, Sampler};
+use crate::dispersion::{Affine, Chain, Cursor, Dispersion, Draws, Sampler};
 use crate::dynamics::{DrawnVehicle, Effects, Model, Part, Plant};
 use crate::margins::Assessment;
+use crate::modal::identify::{self, Solved};
 use crate::modal::spectrum::{Base, Spectrum};
-use crate::modal::{self, Reference, Solver, eigen, identify};
+use crate::modal::{self, Reference, Solver, eigen};
 use crate::vehicle::Vehicle;
 use nalgebra::Complex;
 use rayon::prelude::*;
@@ -173,6 +174,8 @@ pub struct Evaluator<'a> {
     all_poles: bool,
     /// Per parameter, whether a draw acts on it.
     acts: Vec<bool>,
+    /// Per engine, whether a draw acts on one of its parameters.
+    acts_on_engine: Vec<bool>,
     workspaces: Mutex<Vec<Workspace<'a>>>,
 }
 
@@ -206,6 +209,7 @@ impl<'a> Evaluator<'a> {
             times,
             all_poles,
             acts: sampler.dispersion().acts(),
+            acts_on_engine: sampler.dispersion().acts_on_engines(vehicle.engines.len()),
             workspaces: Mutex::new(Vec::new()),
         })
     }
@@ -221,6 +225,10 @@ impl<'a> Evaluator<'a> {
         let Workspace { buffers: all_buffers, cursor, vehicle, poles } = &mut workspace;
         let draws = self.draws(cursor, population, case);
         let fixed = &self.definition.populations[population].fixed;
+        let sensitivity = self.definition.sensitivity.as_ref();
+        let sensitivity = sensitivity.filter(|rule| rule.cases.is_none_or(|cases| case < cases));
+        let chain = sensitivity.map(|_| self.sampler.dispersion().chain(draws, fixed));
+        let chain = chain.unwrap_or_default();
         let mut evaluations = Vec::new();
         for (flight_time, at) in self.times.iter().enumerate() {
             let parameters = self.sampler.dispersion().parameters();
@@ -228,10 +236,9 @@ impl<'a> Evaluator<'a> {
             for variant in 0..at.variants.len() {
                 let plant = at.plant(variant);
                 let buffers = Buffers::of(all_buffers, plant.layout.coordinates());
-                let sensitive = self.definition.sensitivity.as_ref();
                 let sensitive =
-                    sensitive.is_some_and(|rule| rule.covers(variant, flight_time, case));
-                let place = self.place(at, variant, draws, fixed, vehicle);
+                    sensitivity.is_some_and(|rule| rule.covers(variant, flight_time, case));
+                let place = self.place(at, variant, draws, &chain, vehicle);
                 let mut solution = None;
                 let outcome = drawn.clone().and_then(|()| {
                     let (rows, found) =
@@ -308,7 +315,8 @@ impl<'a> Evaluator<'a> {
         at.slots.draw(self.vehicle, parameters, &draws.effects, vehicle)?;
         // The poles about which the grid is refined, as in the run.
         let closed = Buffers::of(buffers, at.plant(variant).layout.coordinates());
-        let place = self.place(at, variant, draws, &[], vehicle);
+        let chain = Chain::default();
+        let place = self.place(at, variant, draws, &chain, vehicle);
         if self.solve(at, &place, (variant, false), closed, poles).is_err() {
             poles.clear();
         }
@@ -329,18 +337,19 @@ impl<'a> Evaluator<'a> {
         at: &'p AtTime,
         variant: usize,
         draws: &'p Draws,
-        fixed: &'p [(usize, f64)],
+        chain: &'p Chain<'p>,
         drawn: &'p DrawnVehicle,
     ) -> Place<'p> {
         Place {
             vehicle: self.vehicle,
-            dispersion: self.sampler.dispersion(),
+            parameters: self.sampler.dispersion().parameters(),
             acts: &self.acts,
+            engines: &self.acts_on_engine,
             slots: &at.slots,
             plant: at.plant(variant),
             effects: &at.variants[variant].effects,
-            draws,
-            fixed,
+            draws: &draws.effects,
+            chain,
             drawn,
         }
     }
@@ -365,12 +374,15 @@ impl<'a> Evaluator<'a> {
         let parameters = self.sampler.dispersion().parameters();
         let drawn = at.slots.draw(self.vehicle, parameters, &draws.effects, vehicle);
         let found = drawn.and_then(|()| {
-            let place = self.place(at, variant, draws, &[], vehicle);
+            let chain = derivatives.then(|| self.sampler.dispersion().chain(draws, &[]));
+            let chain = chain.unwrap_or_default();
+            let place = self.place(at, variant, draws, &chain, vehicle);
             let buffers = Buffers::of(buffers, place.plant.layout.coordinates());
             place.plant.assemble(vehicle, place.effects, &mut buffers.model);
-            let solved = buffers.solver.poles(&buffers.model, poles);
-            solved.map_err(|error| Failure::from(&error))?;
-            let found = self.identify(at, variant, mode, buffers, poles)?;
+            find_poles(at.variants[variant].base.as_ref(), buffers, poles)?;
+            let Buffers { model, scratch, solver, .. } = buffers;
+            let mut solved = Solved::new(model, poles);
+            let found = self.identify(at, [variant, mode], &mut solved, solver, scratch)?;
             let row = |(branch, candidate): (Branch, modal::Candidate)| {
                 let label = &at.labels[mode];
                 let pole = named_pole(place.plant, mode, branch, label, &candidate)?;
@@ -384,27 +396,20 @@ impl<'a> Evaluator<'a> {
         found
     }
 
-    /// The pole of a mode in the model of `buffers`, and its partner if there is one.
+    /// The pole of a mode in a model, and its partner if there is one.
     fn identify(
         &self,
         at: &AtTime,
-        variant: usize,
-        mode: usize,
-        buffers: &mut Buffers,
-        poles: &[Complex<f64>],
+        [variant, mode]: [usize; 2],
+        solved: &mut Solved<'_>,
+        solver: &mut Solver,
+        scratch: &mut Model,
     ) -> Result<Vec<(Branch, modal::Candidate)>, Failure> {
-        let Buffers { model, scratch, solver, .. } = buffers;
-        let prepared = &at.variants[variant];
-        let identity = identify::identify(
-            solver,
-            &prepared.references[mode],
-            &prepared.nominal,
-            model,
-            poles,
-            self.definition.exchange_ratio,
-            scratch,
-        )
-        .map_err(|lost| self.lost(mode, lost))?;
+        let AtVariant { nominal, references, .. } = &at.variants[variant];
+        let ratio = self.definition.exchange_ratio;
+        let identity =
+            identify::identify(solver, &references[mode], nominal, solved, ratio, scratch)
+                .map_err(|lost| self.lost(mode, lost))?;
         let partner = identity.partner.map(|partner| (Branch::Partner, partner));
         Ok(std::iter::once((Branch::Primary, identity.primary)).chain(partner).collect())
     }
@@ -431,27 +436,27 @@ impl<'a> Evaluator<'a> {
         let plant = place.plant;
         plant.assemble(place.drawn, place.effects, &mut buffers.model);
         let solution = find_poles(at.variants[variant].base.as_ref(), buffers, poles)?;
+        let Buffers { model, scratch, solver, bounds, .. } = buffers;
+        let mut solved = Solved::new(model, poles);
         let mut rows = Vec::new();
         for mode in 0..at.labels.len() {
-            for (branch, found) in self.identify(at, variant, mode, buffers, poles)? {
+            for (branch, found) in
+                self.identify(at, [variant, mode], &mut solved, solver, scratch)?
+            {
                 let mut row = named_pole(plant, mode, branch, &at.labels[mode], &found)?;
                 if sensitive {
-                    let Buffers { model, solver, .. } = &mut *buffers;
-                    let near = nearest(poles, row.value).map(|near| {
-                        let pair = solver.pair(model, near);
-                        Reference::new(model, pair)
-                    });
+                    let near = neighbours(&solved, row.value);
+                    let near = near.map(|near| solved.reference(solver, near).clone());
                     let sensitivity = place.sensitivity(&found.reference, near);
                     row.sensitivity = Some(Box::new(sensitivity));
                 }
                 rows.push(row);
             }
         }
-        let Buffers { model, solver, bounds, .. } = buffers;
         if self.all_poles {
             let named: Vec<Complex<f64>> = rows.iter().map(|row: &Pole| row.value).collect();
             for &pole in poles.iter().filter(|pole| !named.contains(pole)) {
-                rows.push(other_pole(plant, &Reference::new(model, solver.pair(model, pole))));
+                rows.push(other_pole(plant, solved.reference(solver, pole)));
             }
         }
         for row in &mut rows {
@@ -497,15 +502,21 @@ fn find_poles(
     Ok(Solution { solver, certificate, determinants })
 }
 
-/// Poles asked for the second-order change of another: more than one, since of a symmetric vehicle the
-/// nearest may be of the other symmetry and not coupled at all.
-const NEIGHBOURS: usize = 3;
-
-/// The other poles that are nearest to one of `poles`.
-fn nearest(poles: &[Complex<f64>], pole: Complex<f64>) -> impl Iterator<Item = Complex<f64>> {
-    let mut others: Vec<_> = poles.iter().copied().filter(|other| *other != pole).collect();
-    others.sort_by(|a, b| (a - pole).norm().total_cmp(&(b - pole).norm()));
-    others.into_iter().take(NEIGHBOURS)
+/// The other poles that are asked for the second-order change of one: the nearest, and the nearest that identity
+/// looked at or, where that is the same, the next. Not one alone, since of a symmetric vehicle the nearest may be of
+/// the other symmetry and not coupled at all.
+fn neighbours(
+    solved: &Solved<'_>,
+    pole: Complex<f64>,
+) -> impl Iterator<Item = Complex<f64>> + use<> {
+    let mut others: Vec<_> =
+        solved.poles().iter().copied().filter(|other| *other != pole).collect();
+    others.sort_by(|a, b| (a - pole).norm_sqr().total_cmp(&(b - pole).norm_sqr()));
+    let (nearest, farther) = others.split_first().map_or((None, &[][..]), |(a, b)| (Some(*a), b));
+    let seen = farther.iter().find(|other| solved.has_seen(**other));
+    let seen = seen.filter(|_| nearest.is_some_and(|nearest| !solved.has_seen(nearest)));
+    let second = seen.or(farther.first()).copied();
+    nearest.into_iter().chain(second)
 }
 
 /// The row of an identified pole.

@@ -117,9 +117,7 @@ impl OpenLoop {
             .map_err(|error| Failure::from(&error))?;
         let mut response = Response::new(&space.a, &space.b, &space.c, &space.d)
             .map_err(|error| Failure::from(&error))?;
-        let mut sensed = DMatrix::zeros(rows.len(), 3);
-        let g = |s: Complex<f64>| {
-            response.at(s, &mut sensed);
+        let one = |s: Complex<f64>, mut sensed: DMatrix<Complex<f64>>| {
             for &row in &attitudes {
                 sensed.row_mut(row).iter_mut().for_each(|attitude| *attitude /= s);
             }
@@ -132,6 +130,9 @@ impl OpenLoop {
                 // At a pole of a filter.
                 None => Matrix3::from_element(Complex::new(f64::NAN, f64::NAN)),
             }
+        };
+        let g = |points: &[Complex<f64>]| {
+            points.iter().zip(response.at(points)).map(|(s, sensed)| one(*s, sensed)).collect()
         };
         let wanted: Vec<f64> = wanted_hz.iter().map(|hz| TAU * hz).collect();
         assess(g, &poles, closed, &wanted, &plan.settings)

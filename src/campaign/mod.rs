@@ -35,4 +35,4 @@ pub use evaluator::Evaluator;
 pub use outline::{DrawColumn, Input, Outline, StoredPoles};
 pub use pool::{Pool, Progress, Span};
 pub use record::{Branch, Evaluation, Failure, FailureKind, Pole, Record};
-pub use sample::Sample;
+pub use sample::{Intervals, Sample};

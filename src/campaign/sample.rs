@@ -145,6 +145,33 @@ impl Sample {
         of_replicates(&of_each?, confidence, independent).ok().map(ends)
     }
 
+    /// Replicate or outer draw of a case.
+    pub(super) fn cluster(&self, case: u64) -> usize {
+        match self.clusters {
+            Clusters::Turns(count) => case as usize % count.max(1),
+            Clusters::Rows(length) => case as usize / length.max(1),
+        }
+    }
+
+    /// Why no interval follows from so many cases, and how to get some; none where intervals follow.
+    pub fn without_intervals(&self, cases: usize) -> Option<String> {
+        if self.intervals(cases) != Intervals::None {
+            return None;
+        }
+        let what = self.drawing.describe();
+        Some(match self.drawing {
+            Drawing::LatinHypercube | Drawing::LowDiscrepancy => format!(
+                "no intervals: one replicate of {what} shows nothing of its error; run again with `replicates = 8` \
+                 (two or more, each of cases/replicates points) under [plan] of the run file"
+            ),
+            Drawing::Nested => format!(
+                "no intervals: these cases are {what}, and one outer draw shows nothing of its error; run again with \
+                 `outer = 30` (two or more) under [plan] of the run file"
+            ),
+            _ => format!("no intervals: these cases are {what}"),
+        })
+    }
+
     /// Where intervals come from, of so many cases.
     pub fn intervals(&self, cases: usize) -> Intervals {
         let replicates = self.replicates(cases) as u64;
@@ -165,4 +192,21 @@ pub(super) fn ends(estimate: Estimate) -> [f64; 2] {
 /// The values that are no NaN.
 pub(super) fn known<'a>(values: impl IntoIterator<Item = &'a f64>) -> Vec<f64> {
     values.into_iter().copied().filter(|value| !value.is_nan()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_plan_without_intervals_says_how_to_get_them() {
+        for drawing in [Drawing::LatinHypercube, Drawing::LowDiscrepancy] {
+            let words = Sample::turns(drawing, 1).without_intervals(100).unwrap();
+            assert!(words.contains("`replicates = 8`") && words.contains("[plan]"), "{words}");
+            assert_eq!(Sample::turns(drawing, 2).without_intervals(100), None);
+        }
+        let designed = Sample::turns(Drawing::Designed, 1).without_intervals(100).unwrap();
+        assert_eq!(designed, "no intervals: these cases are chosen points, not draws");
+        assert_eq!(Sample::INDEPENDENT.without_intervals(100), None);
+    }
 }

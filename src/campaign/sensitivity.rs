@@ -182,8 +182,8 @@ fn of_sample(
             let found = with_replicates(points(&columns, &y), &replicates, witness, &mut notes)?;
             match independent {
                 Ok(_) => (found, Intervals::Replicates),
-                Err(error) => {
-                    notes.push(format!("no intervals: {error} (replicates of the plan)"));
+                Err(_) => {
+                    notes.extend(sample.without_intervals(results.len()));
                     (found, Intervals::None)
                 }
             }

@@ -86,8 +86,8 @@ pub fn run(args: &Args, out: &mut dyn std::io::Write) -> Result<u8, Error> {
         if only > 0 { format!(", {only} that only one of them has") } else { String::new() },
         rows.text()
     )?;
-    if claims == 0 {
-        writeln!(out, "no intervals: these cases are {}", sample.drawing().describe())?;
+    if let Some(without) = sample.without_intervals(cases) {
+        writeln!(out, "{without}")?;
     }
     selection::write(args.output.as_deref(), &rows)?;
     match &args.gates {

@@ -48,6 +48,14 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     };
     if let Some(folder) = &args.run {
         let run = Run::open(folder)?;
+        let populations = &run.outline().definition.populations;
+        let refused: Vec<String> = populations
+            .iter()
+            .filter_map(|p| Some(format!("{}: {}", p.name, p.drawing().independent().err()?)))
+            .collect();
+        if refused.len() == populations.len() {
+            return Err(Error::Usage(format!("no claim: {}", refused.join("; "))));
+        }
         let rows = summarise::summary(&run, summarise::MEMORY)?;
         let text = finished(&claim, run.outline(), &rows);
         write!(out, "{}", text.map_err(|error| Error::Usage(error.to_string()))?)?;

@@ -3,7 +3,7 @@
 use super::{Error, PASS, run::unprepared, selection};
 use crate::campaign::influence::{Influence, Influences};
 use crate::campaign::worst::{Aim, Objective, Quantity};
-use crate::campaign::{Branch, Evaluator, Sample};
+use crate::campaign::{Branch, Evaluator, Intervals, Sample};
 use crate::io::{Run, inputs};
 use crate::problem::Problems;
 use crate::report::influence::{Ranking, Tornado, rows, text};
@@ -21,8 +21,8 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  tvse influence runs/reference
-  tvse influence runs/reference --variant jet_damping --time 110 --output influence.csv")]
+  tvse influence runs/worst-on-worst
+  tvse influence runs/worst-on-worst --variant jet_damping --time 110 --output influence.csv")]
 pub struct Args {
     /// Folder of the run
     run: PathBuf,
@@ -79,7 +79,8 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
             && args.time.is_none_or(|time| time == definition.flight_times_s[row.flight_time]);
         if chosen {
             let key = [row.variant, row.flight_time, mode];
-            all.entry(key).or_default().add(pole.damping_ratio(), sensitivity).map_err(|e| {
+            let influences = all.entry(key).or_insert_with(|| Influences::new(Sample::of(of)));
+            influences.add(row.case, pole.damping_ratio(), sensitivity).map_err(|e| {
                 Problems::damage("tables/modes.parquet", "", e.to_string(), "finite numbers")
             })?;
         }
@@ -93,7 +94,6 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     let sampler = loaded.sampler(definition)?;
     let evaluator = Evaluator::new(&loaded.vehicle.vehicle, &sampler, definition, false)
         .map_err(|error| unprepared(Path::new(&loaded.run.0), &error))?;
-    let drawing = Sample::of(of).drawing();
     let mut rankings = Vec::new();
     for (key, influences) in &all {
         let [variant, flight_time, mode] = *key;
@@ -103,7 +103,7 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
             aim: Aim { variant, baseline: None, mode, quantity: Quantity::DampingRatio },
             flight_time,
         };
-        let ranking = influences.ranking(drawing);
+        let ranking = influences.ranking();
         let with_tornado = |(place, influence): (usize, Influence)| {
             let solved = |sigma: f64| {
                 let mut z = vec![None; outline.draws.len()];
@@ -137,8 +137,13 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         writeln!(out, "{}", text(&outline.draws, shown))?;
         rankings.push(ranking);
     }
-    if let Err(refused) = drawing.independent() {
-        writeln!(out, "no intervals: {refused}")?;
+    let intervals = all.values().map(Influences::intervals).next();
+    match Sample::of(of).without_intervals(of.cases as usize) {
+        Some(without) => writeln!(out, "{without}")?,
+        None if intervals == Some(Intervals::Replicates) => {
+            writeln!(out, "intervals: Student's t over the means of replicates or outer draws")?;
+        }
+        None => {}
     }
     let rows = rows(&outline.draws, &rankings);
     selection::keep(&args.run, "influence.csv", args.output.as_deref(), &rows, out)?;

@@ -74,7 +74,8 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
         ..defaults
     };
     let zero = Complex::default();
-    let g = |s| Matrix3::from_diagonal(&Vector3::new(loops.at(s), zero, zero));
+    let one = |s: &Complex<f64>| Matrix3::from_diagonal(&Vector3::new(loops.at(*s), zero, zero));
+    let g = |points: &[Complex<f64>]| points.iter().map(one).collect();
     let found = assess(g, &poles, &[], &[], &settings)
         .map_err(|error| refuse("--numerator", error.to_string()))?;
     if args.curve {

@@ -209,9 +209,11 @@ fn influences(run: &Run, population: usize) -> Result<Vec<Influenced>, Error> {
         else {
             return Ok(());
         };
-        let (sum, influences) = all.entry([mode, row.variant, row.flight_time]).or_default();
+        let key = [mode, row.variant, row.flight_time];
+        let none = || (0.0, Influences::new(Sample::of(of)));
+        let (sum, influences) = all.entry(key).or_insert_with(none);
         *sum += pole.damping_ratio();
-        influences.add(pole.damping_ratio(), sensitivity).map_err(|error| {
+        influences.add(row.case, pole.damping_ratio(), sensitivity).map_err(|error| {
             Problems::damage("tables/modes.parquet", "", error.to_string(), "finite numbers")
         })
     })?;
@@ -219,7 +221,7 @@ fn influences(run: &Run, population: usize) -> Result<Vec<Influenced>, Error> {
     for ([mode, variant, flight_time], (sum, influences)) in all {
         let mean = sum / influences.cases as f64;
         if least.get(&[mode, variant]).is_none_or(|(other, _)| mean < *other) {
-            let ranking = influences.ranking(Sample::of(of).drawing());
+            let ranking = influences.ranking();
             let cases = [influences.cases, influences.veering];
             let found = Influenced { variant, flight_time, mode, cases, ranking };
             least.insert([mode, variant], (mean, found));

@@ -75,6 +75,10 @@ pub fn run(args: &Args, out: &mut dyn std::io::Write) -> Result<u8, Error> {
     let [text, running] = [&parts[0], &parts[1]]
         .map(|part| lines(part.iter().map(|(name, lines)| (name.as_str(), &lines[..]))).text());
     writeln!(out, "{text}{claims} intervals of 95 % at once")?;
+    let cases = definition.populations[population].cases as usize;
+    if let Some(without) = sample.without_intervals(cases) {
+        writeln!(out, "{without}")?;
+    }
     if !growing.is_empty() {
         writeln!(
             out,

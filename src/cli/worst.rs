@@ -2,7 +2,6 @@
 
 use super::interrupt::Interrupt;
 use super::{Error, FAIL, PASS, campaign, run::unprepared, selection};
-use crate::campaign::definition::Solver;
 use crate::campaign::worst::{
     self, Aim, Method, Quantity, Standing, WorstCase, search::MOST_CORNER_KEYS,
 };
@@ -296,8 +295,6 @@ pub fn replay(
         populations: vec![population],
         sensitivity: None,
         margins: None,
-        // That of the search, whatever the run's.
-        solver: Solver::Dense,
         ..outline.definition.clone()
     };
     let sampler = loaded.sampler(&definition)?;

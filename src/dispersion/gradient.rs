@@ -4,8 +4,10 @@
 //! key that takes part in one, in a group of correlated keys the one from which its score is made, else the
 //! score of its own value. What a parameter does is not known here.
 
+use super::correlation::Group;
 use super::draw::{Dispersion, Role};
 use super::law::Position;
+use super::parameter::Place;
 use super::sampler::Draws;
 use nalgebra::Complex;
 
@@ -16,6 +18,46 @@ pub struct AffineGradient {
     pub scale: Complex<f64>,
     /// By the offset.
     pub offset: Complex<f64>,
+}
+
+/// What a gradient by the effect on a parameter adds to that by the independent score of a draw.
+#[derive(Debug, Clone, Copy)]
+struct Term {
+    parameter: usize,
+    draw: usize,
+    scale: f64,
+    offset: f64,
+}
+
+/// The way from the effects on parameters back to the independent scores at the draws of one case: linear,
+/// so that it is made once however many gradients take it.
+#[derive(Debug, Clone, Default)]
+pub struct Chain<'a> {
+    /// Zero, or none where a value has no slope.
+    start: Vec<Option<Complex<f64>>>,
+    terms: Vec<Term>,
+    groups: &'a [Group],
+}
+
+impl Chain<'_> {
+    /// The gradient by the independent score of every draw, from that by the effects on parameters. `None`
+    /// where the value has no slope: a discrete law, a value that its law cannot give.
+    pub fn gradient(&self, effects: &[AffineGradient]) -> Vec<Option<Complex<f64>>> {
+        let mut found = self.start.clone();
+        for term in &self.terms {
+            let by = effects[term.parameter];
+            if let Some(found) = &mut found[term.draw] {
+                *found += by.scale * term.scale + by.offset * term.offset;
+            }
+        }
+        for group in self.groups {
+            let by: Vec<_> = group.draws.iter().map(|&i| found[i].unwrap_or_default()).collect();
+            for (&index, by) in group.draws.iter().zip(group.pull(&by)) {
+                found[index] = found[index].and(Some(by));
+            }
+        }
+        found
+    }
 }
 
 /// Weight of the individual score beside a common one of weight w, √(1 − w²).
@@ -33,72 +75,76 @@ impl Dispersion {
         acts
     }
 
-    /// The gradient by the independent score of every draw, from that by the effects on parameters.
-    ///
-    /// A draw that stays nominal counts as one at its median; one of the `fixed` draws (index and value)
-    /// does not move with its common score. `None` where the value has no slope: a discrete law, a value
-    /// that its law cannot give.
-    pub fn score_gradient(
-        &self,
-        draws: &Draws,
-        fixed: &[(usize, f64)],
-        effects: &[AffineGradient],
-    ) -> Vec<Option<Complex<f64>>> {
-        let by_value = self.value_gradient(draws, effects);
-        let all = self.draws();
-        let mut found: Vec<Option<Complex<f64>>> = vec![Some(Complex::ZERO); all.len()];
-        for (index, draw) in all.iter().enumerate() {
-            let Role::Value { common, .. } = &draw.role else { continue };
-            let score = match (draws.values[index], draws.scores[index]) {
-                (Some(_), score) => score,
-                (None, _) => Some(0.0),
-            };
-            let slope = score.and_then(|score| draw.law.slope(&Position::of_score(score)));
-            let by_score = slope.map(|slope| by_value[index] * slope);
-            let held = fixed.iter().any(|(fixed, _)| *fixed == index);
-            found[index] = match common {
-                Some(shared) if !held => {
-                    if let (Some(total), Some(by_score)) = (&mut found[shared.draw], by_score) {
-                        *total += by_score * shared.weight;
-                    }
-                    by_score.map(|by_score| by_score * rest(shared.weight))
+    /// Per engine, of as many, whether a draw acts on one of its parameters.
+    pub fn acts_on_engines(&self, engines: usize) -> Vec<bool> {
+        let mut acts = vec![false; engines];
+        for combination in self.combinations() {
+            match self.parameters().all()[combination.parameter].place {
+                Place::Engine(engine) | Place::Actuator(engine, _) | Place::Gimbal(engine, _) => {
+                    acts[engine] = true;
                 }
-                _ => by_score,
-            };
-        }
-        for group in self.groups() {
-            let by: Vec<_> = group.draws.iter().map(|&i| found[i].unwrap_or_default()).collect();
-            for (&index, by) in group.draws.iter().zip(group.pull(&by)) {
-                found[index] = found[index].and(Some(by));
+                _ => {}
             }
         }
-        found
+        acts
     }
 
-    /// The gradient by the value of every draw.
-    fn value_gradient(&self, draws: &Draws, effects: &[AffineGradient]) -> Vec<Complex<f64>> {
-        let mut found = vec![Complex::ZERO; self.draws().len()];
+    /// The [`Chain`] at the draws of a case.
+    ///
+    /// A draw that stays nominal counts as one at its median; one of the `fixed` draws (index and value)
+    /// does not move with its common score.
+    pub fn chain(&self, draws: &Draws, fixed: &[(usize, f64)]) -> Chain<'_> {
+        let all = self.draws();
+        let slope = |(index, draw): (usize, &super::Draw)| {
+            let (value, score) = match (draws.values[index], draws.scores[index]) {
+                (Some(value), score) => (value, score?),
+                (None, _) => (draw.law.value(&Position::of_score(0.0)), 0.0),
+            };
+            draw.law.slope(value, score)
+        };
+        let slopes: Vec<Option<f64>> = all.iter().enumerate().map(slope).collect();
+        let mut held = vec![false; all.len()];
+        fixed.iter().for_each(|(index, _)| held[*index] = true);
+        let mut terms = Vec::with_capacity(2 * all.len());
+        let mut add = |parameter: usize, index: usize, scale: f64, offset: f64| {
+            let Some(slope) = slopes[index] else { return };
+            let mut to = |draw, factor| {
+                let [scale, offset] = [scale, offset].map(|by| by * factor);
+                terms.push(Term { parameter, draw, scale, offset });
+            };
+            match &all[index].role {
+                Role::Value { common: Some(shared), .. } if !held[index] => {
+                    to(shared.draw, slope * shared.weight);
+                    to(index, slope * rest(shared.weight));
+                }
+                _ => to(index, slope),
+            }
+        };
         let value = |index: usize| draws.values[index];
         for combination in self.combinations() {
-            let by = effects[combination.parameter];
+            let parameter = combination.parameter;
             let base = combination.absolute.and_then(value);
             // By the product of all factors: of the nominal or the absolute value.
-            let by_product = base.map_or(by.scale, |base| by.offset * base);
+            let [scale, offset] = base.map_or([1.0, 0.0], |base| [0.0, base]);
             let product_without = |left_out: Option<usize>| -> f64 {
                 let others = combination.scales.iter().filter(|&&i| Some(i) != left_out);
                 others.filter_map(|&i| value(i)).product()
             };
             if let Some(index) = combination.absolute {
-                found[index] += by.offset * product_without(None);
+                add(parameter, index, 0.0, product_without(None));
             }
             for &index in &combination.scales {
-                found[index] += by_product * product_without(Some(index));
+                let product = product_without(Some(index));
+                add(parameter, index, scale * product, offset * product);
             }
             for &index in &combination.offsets {
-                found[index] += by.offset;
+                add(parameter, index, 0.0, 1.0);
             }
         }
-        found
+        let found = slopes.iter().zip(all).map(|(slope, draw)| {
+            (slope.is_some() || draw.role == Role::Common).then_some(Complex::ZERO)
+        });
+        Chain { start: found.collect(), terms, groups: self.groups() }
     }
 
     /// The values of all draws at independent scores, index and value; draws without a score are left out.

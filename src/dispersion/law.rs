@@ -377,37 +377,37 @@ impl Law {
         }
     }
 
-    /// How fast the value follows the normal score, dx/dz = φ(z)/f(x) for the density f, at a place of
-    /// the distribution; zero for a fixed law, `None` for a discrete one, which jumps.
-    pub fn slope(&self, at: &Position) -> Option<f64> {
-        let Position { below, above, score } = *at;
-        let phi = normal::density(score);
+    /// How fast the value follows the normal score, dx/dz = φ(z)/f(x) for the density f, at a value
+    /// and its score; zero for a fixed law, `None` for a discrete one, which jumps.
+    pub fn slope(&self, value: f64, score: f64) -> Option<f64> {
+        let phi = || normal::density(score);
         let slope = match &self.0 {
             Shape::Fixed { .. } => 0.0,
             Shape::Normal { sigma, .. } => *sigma,
-            Shape::TruncatedNormal { sigma, law, .. } => {
-                sigma * law.slope(law.score(below, above), score)
+            Shape::TruncatedNormal { mean, sigma, law, .. } => {
+                sigma * law.slope((value - mean) / sigma, score)
             }
-            Shape::Uniform { low, high } => (high - low) * phi,
+            Shape::Uniform { low, high } => (high - low) * phi(),
             Shape::Triangular { low, mode, high } => {
-                let (x, width) = (self.value(at), high - low);
-                if x <= *mode && mode > low {
-                    phi * width * (mode - low) / (2.0 * (x - low))
+                let width = high - low;
+                if value <= *mode && mode > low {
+                    phi() * width * (mode - low) / (2.0 * (value - low))
                 } else {
-                    phi * width * (high - mode) / (2.0 * (high - x))
+                    phi() * width * (high - mode) / (2.0 * (high - value))
                 }
             }
-            Shape::Lognormal { sigma_ln, .. } => self.value(at) * sigma_ln,
+            Shape::Lognormal { sigma_ln, .. } => value * sigma_ln,
             Shape::Beta { shape, low, high } => {
-                let (t, rest) = shape.quantile(below, above);
-                phi * (high - low) / shape.density(t, rest)
+                let width = high - low;
+                phi() * width / shape.density((value - low) / width, (high - value) / width)
             }
             Shape::Discrete { .. } => return None,
             Shape::Empirical { probabilities, values } => {
+                let below = Position::of_score(score).below;
                 let upper =
                     probabilities.partition_point(|&p| p < below).clamp(1, values.len() - 1);
                 let (p, v) = (&probabilities[upper - 1..=upper], &values[upper - 1..=upper]);
-                phi * (v[1] - v[0]) / (p[1] - p[0])
+                phi() * (v[1] - v[0]) / (p[1] - p[0])
             }
         };
         Some(slope).filter(|slope| slope.is_finite())

@@ -27,7 +27,7 @@ pub mod table;
 
 pub use correlation::Group;
 pub use draw::{Dispersion, Draw, Role, Shared};
-pub use gradient::AffineGradient;
+pub use gradient::{AffineGradient, Chain};
 pub use law::{Bound, Law, Position};
 pub use parameter::{Affine, Parameters, Place, Quantity};
 pub use plan::{Listed, Plan};

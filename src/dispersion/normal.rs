@@ -66,13 +66,16 @@ pub struct Truncated {
     erf: [f64; 2],
     below: [f64; 2],
     above: [f64; 2],
+    /// Φ(b) − Φ(a).
+    inside: f64,
 }
 
 impl Truncated {
     /// Truncated to scores a < b, which may be infinite.
     pub fn new(scores: [f64; 2]) -> Self {
         let erf = scores.map(|z| erf(z * FRAC_1_SQRT_2));
-        Self { scores, erf, below: scores.map(below), above: scores.map(above) }
+        let inside = between(scores[0], scores[1]);
+        Self { scores, erf, below: scores.map(below), above: scores.map(above), inside }
     }
 
     /// The score with the share `below` of the law's probability beneath it and `above` =
@@ -96,15 +99,14 @@ impl Truncated {
     /// φ(z)/φ(t) times the probability inside, for the score t at which the law stands where a whole
     /// normal law stands at `z`: how fast t follows z.
     pub fn slope(&self, t: f64, z: f64) -> f64 {
-        (0.5 * (t - z) * (t + z)).exp() * between(self.scores[0], self.scores[1])
+        (0.5 * (t - z) * (t + z)).exp() * self.inside
     }
 
     /// The shares of the law's probability beneath and above the score `z`.
     pub fn tails(&self, z: f64) -> (f64, f64) {
         let [a, b] = self.scores;
         let z = z.clamp(a, b);
-        let total = between(a, b);
-        (between(a, z) / total, between(z, b) / total)
+        (between(a, z) / self.inside, between(z, b) / self.inside)
     }
 }
 

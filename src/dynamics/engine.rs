@@ -383,10 +383,18 @@ impl Attachment {
         // Jet damping.
         let mut per_flow = real(0.0);
         if effects.case_jet_damping && !self.case_per_flow.is_empty() {
-            for (row, entries) in self.case_per_flow.chunks_exact(columns.body).enumerate() {
-                let sum: C = entries.iter().zip(vectors.right).map(|(c, x)| x * *c).sum();
-                per_flow -= s * vectors.left[row] * sum;
+            // Row by row onto the columns, whose sums do not wait for each other.
+            let mut sums = vec![[0.0; 2]; columns.body];
+            for (left, entries) in
+                vectors.left.iter().zip(self.case_per_flow.chunks_exact(columns.body))
+            {
+                for ([re, im], entry) in sums.iter_mut().zip(entries) {
+                    *re += left.re * entry;
+                    *im += left.im * entry;
+                }
             }
+            let sums = sums.iter().zip(vectors.right);
+            per_flow -= s * sums.map(|([re, im], x)| C::new(*re, *im) * x).sum::<C>();
         }
         let (flow, length) = (effects.thrust * engine.mass_flow_kg_s, engine.length_m);
         if effects.nozzle_jet_damping != NozzleJet::Off {
@@ -437,6 +445,8 @@ impl Attachment {
         to.mass_kg += per_mass;
         to.cg_m += per_cg * mass;
 
+        to.shape_gain.reserve_exact(columns.body - columns.rigid);
+        to.slope_gain.reserve_exact(columns.body - columns.rigid);
         for (local, (shape, slope)) in
             self.shape.iter().zip(&self.slope).enumerate().skip(columns.rigid)
         {

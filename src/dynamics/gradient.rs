@@ -86,16 +86,21 @@ impl Gradient {
 
 impl Plant {
     /// The form of `drawn` under `effects` at `vectors`, and its gradient.
+    ///
+    /// Of the `engines`, those for which there is false have no gradient; where they are locked on a held
+    /// body, so that no other number acts through them, they are no part of the form either.
     pub fn gradient(
         &self,
         drawn: &DrawnVehicle,
         effects: &Effects,
         vectors: &Vectors<'_>,
+        engines: &[bool],
     ) -> Gradient {
+        let asked = engines;
         let (layout, s) = (&self.layout, vectors.s);
         let mut value = C::new(0.0, 0.0);
-        let mut frequency_rad_s = Vec::new();
-        let mut damping_ratio = Vec::new();
+        let mut frequency_rad_s = Vec::with_capacity(layout.elastic().len());
+        let mut damping_ratio = Vec::with_capacity(layout.elastic().len());
         for (mode, at) in layout.elastic().enumerate() {
             let (omega, zeta) = (drawn.body.frequency_rad_s[mode], drawn.body.damping_ratio[mode]);
             let product = vectors.product(at);
@@ -110,11 +115,15 @@ impl Plant {
         }
         let acceleration = self.mean_acceleration(drawn, effects);
         let mut by_acceleration = C3::zeros();
-        let mut engines = Vec::new();
+        let mut engines = Vec::with_capacity(self.attachments.len());
         for (index, (attachment, engine)) in self.attachments.iter().zip(&drawn.engines).enumerate()
         {
             let own = layout.gimbal(index);
             let columns = Columns::new(layout, own);
+            if !asked[index] && own.is_none() && columns.rigid == 0 {
+                engines.push(EngineGradient::default());
+                continue;
+            }
             let (part, mut gradient) =
                 attachment.form(engine, &columns, &acceleration, effects, vectors);
             value += part.value;

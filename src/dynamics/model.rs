@@ -55,6 +55,13 @@ impl Model {
         self.mass.nrows()
     }
 
+    /// Mass, damping and stiffness down a column.
+    pub fn column(&self, column: usize) -> impl Iterator<Item = [f64; 3]> + '_ {
+        let [mass, damping, stiffness] =
+            [&self.mass, &self.damping, &self.stiffness].map(|matrix| matrix.col_as_slice(column));
+        mass.iter().zip(damping).zip(stiffness).map(|((m, d), k)| [*m, *d, *k])
+    }
+
     /// Number of states that are solved for: 2n + p less the null states.
     pub fn states(&self) -> usize {
         self.second_order + self.coordinates() - self.null_states.len()

@@ -115,7 +115,7 @@ impl Assessment {
 /// # Errors
 /// See [`Error`].
 pub fn assess(
-    mut g: impl FnMut(Complex<f64>) -> Matrix3<Complex<f64>>,
+    mut g: impl FnMut(&[Complex<f64>]) -> Vec<Matrix3<Complex<f64>>>,
     poles: &[Complex<f64>],
     also: &[Complex<f64>],
     wanted_rad_s: &[f64],
@@ -130,7 +130,7 @@ pub fn assess(
     let contour = curve.contour;
     let mut at = |place: f64| {
         let s = contour.at(place);
-        let sample = Sample::new(place, s, &g(s));
+        let sample = Sample::new(place, s, &g(&[s])[0]);
         if sample.is_finite() { Ok(sample) } else { Err(Error::NonFinite(s)) }
     };
     let mut axes = [AxisMargins::none(); 3];
@@ -259,8 +259,15 @@ pub(super) fn is_away(l: Complex<f64>, margin_deg: f64) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+
+    /// A loop matrix given one frequency at a time.
+    pub(in crate::margins) fn each(
+        mut g: impl FnMut(Complex<f64>) -> Matrix3<Complex<f64>>,
+    ) -> impl FnMut(&[Complex<f64>]) -> Vec<Matrix3<Complex<f64>>> {
+        move |points| points.iter().map(|s| g(*s)).collect()
+    }
     use nalgebra::Vector3;
 
     fn s(re: f64, im: f64) -> Complex<f64> {
@@ -275,7 +282,8 @@ mod tests {
     }
 
     fn roll(l: impl Fn(Complex<f64>) -> Complex<f64>, poles: &[Complex<f64>]) -> AxisMargins {
-        let found = assess(single(l), poles, &[], &[], &Settings::default()).expect("scanned");
+        let found =
+            assess(each(single(l)), poles, &[], &[], &Settings::default()).expect("scanned");
         assert!(found.is_stable());
         found.axes[0]
     }
@@ -329,7 +337,8 @@ mod tests {
         // s³ + 10 s² + 10 s + 10 + k: stable up to k = 90.
         let l = |k: f64| move |s: Complex<f64>| k / (s * s * s + 10.0 * s * s + 10.0 * s + 10.0);
         let count = |k: f64| {
-            let found = assess(single(l(k)), &[], &[], &[], &Settings::default()).expect("scanned");
+            let found =
+                assess(each(single(l(k))), &[], &[], &[], &Settings::default()).expect("scanned");
             (found.unstable, found.axes[0] == AxisMargins::none())
         };
         assert_eq!(count(89.9), (0, false));
@@ -344,7 +353,8 @@ mod tests {
         // 1/(s − 1) with a gain below 1 stays unstable, and so it does without any feedback.
         for gain in [0.0, 0.9] {
             let l = single(move |s| gain / (s - 1.0));
-            let found = assess(l, &[s(1.0, 0.0)], &[], &[], &Settings::default()).expect("scanned");
+            let found =
+                assess(each(l), &[s(1.0, 0.0)], &[], &[], &Settings::default()).expect("scanned");
             assert_eq!(found.unstable, 1);
         }
     }
@@ -354,14 +364,15 @@ mod tests {
         // A double integrator with rate and attitude feedback, and one with the wrong sign of rate.
         let pd = |rate: f64| single(move |s: Complex<f64>| (rate * s + 1.0) / (s * s));
         let count = |rate: f64| {
-            assess(pd(rate), &[], &[], &[], &Settings::default()).expect("scanned").unstable
+            assess(each(pd(rate)), &[], &[], &[], &Settings::default()).expect("scanned").unstable
         };
         assert_eq!(count(1.4), 0);
         assert_eq!(count(-1.4), 2);
         // With an integrator as well: s³ + 1.4 s² + s + i.
         let pid = |i: f64| single(move |s: Complex<f64>| (1.4 + 1.0 / s + i / (s * s)) / s);
-        let count =
-            |i: f64| assess(pid(i), &[], &[], &[], &Settings::default()).expect("scanned").unstable;
+        let count = |i: f64| {
+            assess(each(pid(i)), &[], &[], &[], &Settings::default()).expect("scanned").unstable
+        };
         assert_eq!(count(1.3), 0);
         assert_eq!(count(1.5), 2);
     }
@@ -374,7 +385,7 @@ mod tests {
         let pole = s(-1e-5 * 31.4, 31.4 * (1.0_f64 - 1e-10).sqrt());
         let count = |gain: f64| {
             let l = single(move |s| mode(gain, s));
-            let found = assess(l, &[pole], &[], &[], &Settings::default()).expect("scanned");
+            let found = assess(each(l), &[pole], &[], &[], &Settings::default()).expect("scanned");
             (found.unstable, found.axes[0].gain_high_db)
         };
         assert_eq!(count(1e-3).0, 0);
@@ -396,7 +407,8 @@ mod tests {
                 g
             }
         };
-        let found = |c| assess(coupled(c), &[], &[], &[], &Settings::default()).expect("scanned");
+        let found =
+            |c| assess(each(coupled(c)), &[], &[], &[], &Settings::default()).expect("scanned");
         let half = found(0.5);
         assert_eq!(half.unstable, 0);
         // L = 1/s − c²/(s(s + 1)) = (s + 1 − c²)/(s (s + 1)): no crossing of −180°.
@@ -412,18 +424,19 @@ mod tests {
             let l = 25.0 / (s * s * s + 10.0 * s * s + 10.0 * s + 10.0);
             Matrix3::from_diagonal(&Vector3::new(l, Complex::default(), Complex::default()))
         };
-        assess(g, &[], &[], &[], &Settings::default()).expect("scanned");
+        assess(each(g), &[], &[], &[], &Settings::default()).expect("scanned");
         assert!(count < 300, "{count}");
     }
 
     #[test]
     fn what_cannot_be_followed_is_an_error() {
         let settings = Settings::default();
-        let nan = assess(single(|_| s(f64::NAN, 0.0)), &[], &[], &[], &settings);
+        let nan = assess(each(single(|_| s(f64::NAN, 0.0))), &[], &[], &[], &settings);
         assert!(matches!(nan, Err(Error::NonFinite(_))));
-        let undamped = assess(single(|s| s / (s * s + 4.0)), &[s(0.0, 2.0)], &[], &[], &settings);
+        let undamped =
+            assess(each(single(|s| s / (s * s + 4.0))), &[s(0.0, 2.0)], &[], &[], &settings);
         assert!(matches!(undamped, Err(Error::OnAxis(_) | Error::NonFinite(_))), "{undamped:?}");
-        let large = assess(single(|_| s(3.0, 0.0)), &[], &[], &[], &settings);
+        let large = assess(each(single(|_| s(3.0, 0.0))), &[], &[], &[], &settings);
         assert!(matches!(large, Err(Error::Large(_))));
     }
 }

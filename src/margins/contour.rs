@@ -99,7 +99,7 @@ impl Curve {
     }
 }
 
-/// Scans the loop matrix `g` along the contour.
+/// Scans the loop matrix `g`, given at several frequencies at once, along the contour.
 ///
 /// `poles` are poles of the open and, where known, the closed loop (one of each complex pair): the
 /// grid is refined about the lightly damped ones. `wanted_rad_s` are frequencies at which a sample is wanted.
@@ -110,46 +110,31 @@ impl Curve {
 /// # Errors
 /// See [`Error`].
 pub fn scan(
-    g: &mut impl FnMut(Complex<f64>) -> Matrix3<Complex<f64>>,
+    g: &mut impl FnMut(&[Complex<f64>]) -> Vec<Matrix3<Complex<f64>>>,
     poles: &[Complex<f64>],
     wanted_rad_s: &[f64],
     settings: &Settings,
 ) -> Result<Curve, Error> {
     let (contour, places) = places(poles, wanted_rad_s, settings);
-    let mut sample = |place: f64| {
-        let s = contour.at(place);
-        let sample = Sample::new(place, s, &g(s));
-        if sample.is_finite() { Ok(sample) } else { Err(Error::NonFinite(s)) }
-    };
-    let mut samples: Vec<Sample> = Vec::with_capacity(2 * places.len());
-    samples.push(sample(places[0])?);
-    let mut ahead = Vec::new();
+    let mut samples = contour.samples(g, &places)?;
+    let mut fine = vec![false; samples.len()];
+    refine(&contour, g, &mut samples, &mut fine)?;
+    // Upwards as far as needed for the loops to die out, within reason.
     let step = std::f64::consts::LN_10 / f64::from(settings.points_per_decade);
     let end = places[places.len() - 1];
-    // Upwards as far as needed for the loops to die out, within reason.
-    let upwards =
-        (1..=MOST_DECADES_BEYOND * settings.points_per_decade).map(|i| end + step * f64::from(i));
-    for place in places[1..].iter().copied().chain(upwards) {
-        let dead = |sample: &Sample| (sample.difference - 1.0).norm() < DEAD;
-        if place > end && samples.last().is_some_and(dead) {
+    let dead = |sample: &Sample| (sample.difference - 1.0).norm() < DEAD;
+    for decade in 0..MOST_DECADES_BEYOND {
+        if samples.last().is_some_and(dead) {
             break;
         }
-        ahead.push(sample(place)?);
-        while let Some(next) = ahead.last() {
-            let last = samples[samples.len() - 1];
-            if is_coarse(&last, next) {
-                if !(next.place - last.place > SMALLEST) {
-                    return Err(Error::OnAxis(next.omega_rad_s()));
-                }
-                let middle = sample(0.5 * (last.place + next.place))?;
-                ahead.push(middle);
-            } else {
-                samples.extend(ahead.pop());
-            }
-            if samples.len() + ahead.len() > MOST_SAMPLES {
-                return Err(Error::Effort);
-            }
-        }
+        let points = 1..=settings.points_per_decade;
+        let of = |i: u32| end + step * f64::from(decade * settings.points_per_decade + i);
+        let mut more = contour.samples(g, &points.map(of).collect::<Vec<f64>>())?;
+        let needed = more.iter().position(dead).map_or(more.len(), |first| first + 1);
+        more.truncate(needed);
+        samples.extend(more);
+        fine.resize(samples.len(), false);
+        refine(&contour, g, &mut samples, &mut fine)?;
     }
     let end = samples[samples.len() - 1].difference;
     if !((end - 1.0).norm() < DEAD) {
@@ -157,6 +142,58 @@ pub fn scan(
     }
     let phase_deg = phases(&samples);
     Ok(Curve { contour, samples, phase_deg })
+}
+
+impl Contour {
+    /// The loops at several places.
+    fn samples(
+        &self,
+        g: &mut impl FnMut(&[Complex<f64>]) -> Vec<Matrix3<Complex<f64>>>,
+        places: &[f64],
+    ) -> Result<Vec<Sample>, Error> {
+        let points: Vec<Complex<f64>> = places.iter().map(|place| self.at(*place)).collect();
+        let found = g(&points).into_iter().zip(places.iter().zip(points));
+        found
+            .map(|(g, (&place, s))| {
+                let sample = Sample::new(place, s, &g);
+                if sample.is_finite() { Ok(sample) } else { Err(Error::NonFinite(s)) }
+            })
+            .collect()
+    }
+}
+
+/// Halves intervals, all coarse ones at a time, until none is; `fine` tells those known to be fine by their ends.
+fn refine(
+    contour: &Contour,
+    g: &mut impl FnMut(&[Complex<f64>]) -> Vec<Matrix3<Complex<f64>>>,
+    samples: &mut Vec<Sample>,
+    fine: &mut Vec<bool>,
+) -> Result<(), Error> {
+    loop {
+        let mut middles = Vec::new();
+        for (pair, fine) in samples.windows(2).zip(&mut fine[1..]).filter(|(_, fine)| !**fine) {
+            *fine = !is_coarse(&pair[0], &pair[1]);
+            if !*fine {
+                if !(pair[1].place - pair[0].place > SMALLEST) {
+                    return Err(Error::OnAxis(pair[1].omega_rad_s()));
+                }
+                middles.push(0.5 * (pair[0].place + pair[1].place));
+            }
+        }
+        if middles.is_empty() {
+            return Ok(());
+        }
+        if samples.len() + middles.len() > MOST_SAMPLES {
+            return Err(Error::Effort);
+        }
+        samples.extend(contour.samples(g, &middles)?);
+        fine.resize(samples.len(), false);
+        let mut order: Vec<usize> = (0..samples.len()).collect();
+        order.sort_by(|a, b| samples[*a].place.total_cmp(&samples[*b].place));
+        *samples = order.iter().map(|i| samples[*i]).collect();
+        // An interval that was halved is two new ones.
+        *fine = order.iter().map(|i| fine[*i]).collect();
+    }
 }
 
 /// The contour and the places to start from, ascending.

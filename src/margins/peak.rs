@@ -168,6 +168,7 @@ fn keeps_away(
 mod tests {
     use super::super::assess;
     use super::*;
+    use crate::margins::assess::tests::each;
     use nalgebra::{Matrix3, Vector3};
 
     const OMEGA: f64 = 31.4;
@@ -184,7 +185,7 @@ mod tests {
             Matrix3::from_diagonal(&Vector3::new(mode * turn, zero, zero))
         };
         let pole = Complex::new(-ZETA * OMEGA, OMEGA * (1.0 - ZETA * ZETA).sqrt());
-        let found = assess(g, &[pole], &[], &[], &Settings::default()).expect("scanned");
+        let found = assess(each(g), &[pole], &[], &[], &Settings::default()).expect("scanned");
         found.peaks[0]
     }
 
@@ -219,7 +220,7 @@ mod tests {
                 Matrix3::from_diagonal(&Vector3::new(gain * mode, zero, zero))
             };
             let pole = Complex::new(ZETA * OMEGA, OMEGA * (1.0 - ZETA * ZETA).sqrt());
-            let found = assess(g, &[pole], &[], &[], &Settings::default()).expect("scanned");
+            let found = assess(each(g), &[pole], &[], &[], &Settings::default()).expect("scanned");
             (found.unstable, found.peaks[0].stabilised)
         };
         assert_eq!(unstable(0.9), (2, Stabilised::Neither));

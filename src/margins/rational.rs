@@ -145,7 +145,9 @@ mod tests {
                 ..Settings::default()
             };
             let zero = Complex::default();
-            let g = |s| Matrix3::from_diagonal(&Vector3::new(loops.at(s), zero, zero));
+            let one =
+                |s: &Complex<f64>| Matrix3::from_diagonal(&Vector3::new(loops.at(*s), zero, zero));
+            let g = |points: &[Complex<f64>]| points.iter().map(one).collect();
             let margins = assess(g, &loops.poles().unwrap(), &[], &[], &settings).unwrap().axes[0];
             [
                 margins.gain_high_db.value,

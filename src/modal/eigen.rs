@@ -4,14 +4,14 @@
 //! Hessenberg QR, all sequential and in buffers that are reused; what poles mean is decided in
 //! `identify`.
 
+use super::factors::Factors;
 use crate::dynamics::Model;
 use crate::dynamics::servo::Row;
 use crate::vehicle::StateSpace;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt;
 use faer::linalg::evd::{self, ComputeEigenvectors, EvdParams};
-use faer::linalg::lu::partial_pivoting as lu;
-use faer::{Conj, Mat, MatMut, MatRef, Par, Spec, c64};
+use faer::{Mat, MatMut, MatRef, Par, Spec, c64};
 use nalgebra::DMatrix;
 use std::ops::Range;
 
@@ -76,12 +76,11 @@ pub struct Solver {
     kept: Vec<usize>,
     real: Vec<f64>,
     imaginary: Vec<f64>,
-    pencil: Mat<c64>,
+    pencil: Factors,
     /// Power of two by which each coordinate is scaled in the pencil.
     scale: Vec<f64>,
-    permutation: Vec<usize>,
-    inverse_permutation: Vec<usize>,
-    vectors: Mat<c64>,
+    right: Vec<c64>,
+    left: Vec<c64>,
     memory: MemBuffer,
 }
 
@@ -107,14 +106,6 @@ impl Solver {
                 Par::Seq,
                 Spec::<EvdParams, f64>::default(),
             ),
-            lu::factor::lu_in_place_scratch::<usize, c64>(
-                coordinates,
-                coordinates,
-                Par::Seq,
-                Spec::<lu::factor::PartialPivLuParams, c64>::default(),
-            ),
-            lu::solve::solve_in_place_scratch::<usize, c64>(coordinates, 1, Par::Seq),
-            lu::solve::solve_transpose_in_place_scratch::<usize, c64>(coordinates, 1, Par::Seq),
         ];
         Self {
             coordinates,
@@ -124,11 +115,10 @@ impl Solver {
             kept: Vec::with_capacity(states),
             real: vec![0.0; states],
             imaginary: vec![0.0; states],
-            pencil: Mat::zeros(coordinates, coordinates),
+            pencil: Factors::new(coordinates),
             scale: vec![1.0; coordinates],
-            permutation: vec![0; coordinates],
-            inverse_permutation: vec![0; coordinates],
-            vectors: Mat::zeros(coordinates, 2),
+            right: Vec::with_capacity(coordinates),
+            left: Vec::with_capacity(coordinates),
             memory: MemBuffer::new(StackReq::any_of(&requirements)),
         }
     }
@@ -318,64 +308,29 @@ impl Solver {
     ///
     /// For a repeated pole any vector of the eigenspace may come back.
     pub fn pair(&mut self, model: &Model, pole: c64) -> Pair {
-        let n = self.coordinates;
         self.fill_pencil(model, pole);
-        let (info, permutation) = lu::factor::lu_in_place(
-            self.pencil.as_mut(),
-            &mut self.permutation,
-            &mut self.inverse_permutation,
-            Par::Seq,
-            MemStack::new(&mut self.memory),
-            Spec::<lu::factor::PartialPivLuParams, c64>::default(),
-        );
-        let _ = info;
-        // At a pole the last pivot is of the order of rounding; an exact zero would divide by it.
-        let scale = (0..n).map(|i| self.pencil[(i, i)].norm()).fold(0.0, f64::max);
-        for i in 0..n {
-            if !(self.pencil[(i, i)].norm() > scale * f64::EPSILON * f64::EPSILON) {
-                self.pencil[(i, i)] = c64::new(scale * f64::EPSILON, 0.0);
-            }
-        }
+        self.pencil.factor();
         // A start with no structure that could be orthogonal to the vector sought.
-        for row in 0..n {
-            let start = 1.0 + 0.5 * (row as f64 + 1.0).sin();
-            self.vectors[(row, 0)] = c64::new(start, 0.0);
-            self.vectors[(row, 1)] = c64::new(start, 0.0);
-        }
+        let start =
+            (0..self.coordinates).map(|row| c64::new(1.0 + 0.5 * (row as f64 + 1.0).sin(), 0.0));
+        self.right.clear();
+        self.right.extend(start);
+        self.left.clone_from(&self.right);
         for _ in 0..2 {
-            lu::solve::solve_in_place_with_conj(
-                self.pencil.as_ref(),
-                self.pencil.as_ref(),
-                permutation,
-                Conj::No,
-                self.vectors.as_mut().subcols_mut(0, 1),
-                Par::Seq,
-                MemStack::new(&mut self.memory),
-            );
-            lu::solve::solve_transpose_in_place_with_conj(
-                self.pencil.as_ref(),
-                self.pencil.as_ref(),
-                permutation,
-                Conj::Yes,
-                self.vectors.as_mut().subcols_mut(1, 1),
-                Par::Seq,
-                MemStack::new(&mut self.memory),
-            );
-            for column in 0..2 {
-                let norm = self.vectors.col(column).norm_l2();
-                for row in 0..n {
-                    self.vectors[(row, column)] /= norm;
-                }
+            self.pencil.solve(&mut self.right);
+            self.pencil.solve_adjoint(&mut self.left);
+            for vector in [&mut self.right, &mut self.left] {
+                let scale = norm(vector).recip();
+                vector.iter_mut().for_each(|z| *z *= scale);
             }
         }
         let (residual, bound) = self.residual(model, pole);
-        let unscaled = |column: usize| {
-            let vector: Vec<c64> =
-                (0..n).map(|row| self.vectors[(row, column)] * self.scale[row]).collect();
-            let norm = norm(&vector);
-            vector.into_iter().map(|z| z / norm).collect()
+        let unscaled = |vector: &[c64]| {
+            let scaled = || vector.iter().zip(&self.scale).map(|(z, scale)| z * *scale);
+            let norm = scaled().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
+            scaled().map(|z| z / norm).collect()
         };
-        Pair { pole, right: unscaled(0), left: unscaled(1), residual, bound }
+        Pair { pole, right: unscaled(&self.right), left: unscaled(&self.left), residual, bound }
     }
 
     /// Fills the pencil with `S L(s) S`, where the powers of two S bring the diagonal of
@@ -391,36 +346,36 @@ impl Solver {
             let power = (-0.5 * size.log2()).round();
             *scale = if power.is_finite() { power.exp2() } else { 1.0 };
         }
-        for column in 0..model.coordinates() {
-            for row in 0..model.coordinates() {
-                let at = (row, column);
-                let entry = square * model.mass[at] + s * model.damping[at] + model.stiffness[at];
-                self.pencil[at] = entry * (self.scale[row] * self.scale[column]);
-            }
+        for (column, of_column) in self.scale.iter().enumerate() {
+            let entries = self.scale.iter().zip(model.column(column));
+            let entries =
+                entries.map(|(of_row, [m, d, k])| (square * m + s * d + k) * (of_row * of_column));
+            self.pencil.set_column(column, entries);
         }
     }
 
     /// Relative residual of the vectors found and the bound of the pole, see [`Pair`].
     fn residual(&self, model: &Model, s: c64) -> (f64, f64) {
         let n = model.coordinates();
-        let (right, left) = (self.vectors.col(0), self.vectors.col(1));
-        let (square, modulus) = (s * s, s.norm());
+        let modulus = s.norm();
         let mut rows = vec![c64::new(0.0, 0.0); n];
         let mut columns = rows.clone();
         let mut sums = [0.0_f64; 3];
         let mut derivative = c64::new(0.0, 0.0);
-        for (column, to_column) in columns.iter_mut().enumerate() {
-            for (row, to_row) in rows.iter_mut().enumerate() {
-                let (at, scale) = ((row, column), self.scale[row] * self.scale[column]);
-                let [m, d, k] = [model.mass[at], model.damping[at], model.stiffness[at]];
-                let entry = (square * m + s * d + k) * scale;
-                *to_row += entry * right[column];
-                *to_column += left[row].conj() * entry;
-                derivative += left[row].conj() * right[column] * ((2.0 * s * m + d) * scale);
-                for (sum, value) in sums.iter_mut().zip([m, d, k]) {
-                    *sum += (value * scale).powi(2);
-                }
+        for (column, (of_column, right)) in self.scale.iter().zip(&self.right).enumerate() {
+            let (mut to_column, mut by_column) = (c64::new(0.0, 0.0), c64::new(0.0, 0.0));
+            let lines = rows.iter_mut().zip(&self.left).zip(&self.scale);
+            for (((to_row, left), of_row), values) in lines.zip(model.column(column)) {
+                let [m, d, k] = values.map(|value| value * (of_row * of_column));
+                let (linear, left) = (s * m + d, left.conj());
+                let entry = s * linear + k;
+                *to_row += entry * right;
+                to_column += left * entry;
+                by_column += left * (s * m + linear);
+                sums = [sums[0] + m * m, sums[1] + d * d, sums[2] + k * k];
             }
+            columns[column] = to_column;
+            derivative += by_column * right;
         }
         let [m, d, k] = sums.map(f64::sqrt);
         let size = m * modulus * modulus + d * modulus + k;

@@ -21,6 +21,42 @@ pub struct Reference {
     derivative: c64,
 }
 
+/// A model with its poles; the vectors of each are found once, however many modes look at it.
+#[derive(Debug, Clone)]
+pub struct Solved<'a> {
+    model: &'a Model,
+    poles: &'a [c64],
+    seen: Vec<Reference>,
+}
+
+impl<'a> Solved<'a> {
+    /// A model and all its poles.
+    pub fn new(model: &'a Model, poles: &'a [c64]) -> Self {
+        Self { model, poles, seen: Vec::new() }
+    }
+
+    /// All poles.
+    pub fn poles(&self) -> &'a [c64] {
+        self.poles
+    }
+
+    /// Whether the vectors of a pole are known.
+    pub fn has_seen(&self, pole: c64) -> bool {
+        self.seen.iter().any(|known| known.pair.pole == pole)
+    }
+
+    /// A pole of the model with its vectors.
+    pub fn reference(&mut self, solver: &mut Solver, pole: c64) -> &Reference {
+        let known = self.seen.iter().position(|known| known.pair.pole == pole);
+        let index = known.unwrap_or_else(|| {
+            let pair = solver.pair(self.model, pole);
+            self.seen.push(Reference::new(self.model, pair));
+            self.seen.len() - 1
+        });
+        &self.seen[index]
+    }
+}
+
 /// A pole of a model that overlaps with a reference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
@@ -72,14 +108,15 @@ impl Reference {
         let mut left_mass = vec![c64::new(0.0, 0.0); n];
         let mut left_damping = left_mass.clone();
         let mut derivative = c64::new(0.0, 0.0);
-        for column in 0..n {
-            for row in 0..n {
-                let left = pair.left[row].conj();
-                left_mass[column] += left * model.mass[(row, column)];
-                left_damping[column] += left * model.damping[(row, column)];
+        for (column, right) in pair.right.iter().enumerate() {
+            let (mut mass, mut damping) = (c64::new(0.0, 0.0), c64::new(0.0, 0.0));
+            for (left, [m, d, _]) in pair.left.iter().zip(model.column(column)) {
+                let left = left.conj();
+                mass += left * m;
+                damping += left * d;
             }
-            derivative +=
-                (2.0 * pair.pole * left_mass[column] + left_damping[column]) * pair.right[column];
+            derivative += (2.0 * pair.pole * mass + damping) * right;
+            (left_mass[column], left_damping[column]) = (mass, damping);
         }
         Self { pair, left_mass, left_damping, derivative }
     }
@@ -144,15 +181,15 @@ impl Reference {
 
     /// First guess of the same pole in `model`: the root nearest s₀ of `y₀ᴴ L(s) x₀ = 0`.
     fn predict(&self, model: &Model) -> c64 {
-        let n = model.coordinates();
         let mut form = [c64::new(0.0, 0.0); 3];
-        for column in 0..n {
-            let right = self.pair.right[column];
-            for row in 0..n {
-                let weight = self.pair.left[row].conj() * right;
-                form[0] += weight * model.stiffness[(row, column)];
-                form[1] += weight * model.damping[(row, column)];
-                form[2] += weight * model.mass[(row, column)];
+        for (column, right) in self.pair.right.iter().enumerate() {
+            let mut sums = [c64::new(0.0, 0.0); 3];
+            for (left, [m, d, k]) in self.pair.left.iter().zip(model.column(column)) {
+                let left = left.conj();
+                sums = [sums[0] + left * k, sums[1] + left * d, sums[2] + left * m];
+            }
+            for (form, sum) in form.iter_mut().zip(sums) {
+                *form += sum * right;
             }
         }
         let root = (form[1] * form[1] - 4.0 * form[2] * form[0]).sqrt();
@@ -163,27 +200,26 @@ impl Reference {
     }
 }
 
-/// The poles of `model` that overlap with `reference`, best first; none if there is no pole.
+/// The poles of a model that overlap with `reference`, best first; none if there is no pole.
 ///
 /// Poles are tried from the nearest to the predicted one outwards until the overlaps account for
 /// all but a small rest.
 fn candidates(
     solver: &mut Solver,
-    model: &Model,
-    poles: &[c64],
+    solved: &mut Solved<'_>,
     reference: &Reference,
 ) -> Vec<Candidate> {
-    let guess = reference.predict(model);
-    let mut order: Vec<c64> = poles.to_vec();
-    order.sort_by(|a, b| (a - guess).norm().total_cmp(&(b - guess).norm()));
+    let guess = reference.predict(solved.model);
+    let mut order: Vec<c64> = solved.poles.to_vec();
+    order.sort_by(|a, b| (a - guess).norm_sqr().total_cmp(&(b - guess).norm_sqr()));
     let mut found: Vec<Candidate> = Vec::new();
     let mut rest = c64::new(1.0, 0.0);
     for pole in order {
-        let other = Reference::new(model, solver.pair(model, pole));
-        let overlap = reference.overlap(&other);
+        let other = solved.reference(solver, pole);
+        let overlap = reference.overlap(other);
         rest -= overlap;
         if overlap.norm().is_finite() {
-            found.push(Candidate { reference: other, overlap });
+            found.push(Candidate { reference: other.clone(), overlap });
         }
         if found.len() >= 2 && rest.norm() <= UNACCOUNTED {
             break;
@@ -217,7 +253,8 @@ pub fn follow(
             Some(known) => known.clone_into(&mut poles),
             None => solver.poles(model, &mut poles)?,
         }
-        let found = candidates(solver, model, &poles, &reference).into_iter().next();
+        let mut solved = Solved::new(model, &poles);
+        let found = candidates(solver, &mut solved, &reference).into_iter().next();
         let best = found.ok_or(Lost::Overlap { best: 0.0, least: LEAST_OVERLAP })?;
         let overlap = best.overlap.norm();
         if overlap >= STEP_OVERLAP || step <= LEAST_STEP {
@@ -234,7 +271,7 @@ pub fn follow(
     Ok(reference)
 }
 
-/// Identifies the named mode `reference` of the model `nominal` among the `poles` of `case`.
+/// Identifies the named mode `reference` of the model `nominal` among the poles of `case`.
 ///
 /// Where the second-best overlap reaches `exchange_ratio` of the best, the mode is followed by
 /// homotopy from `nominal` to `case` and the other of the two is its partner. `scratch` has the
@@ -246,12 +283,11 @@ pub fn identify(
     solver: &mut Solver,
     reference: &Reference,
     nominal: &Model,
-    case: &Model,
-    poles: &[c64],
+    case: &mut Solved<'_>,
     exchange_ratio: f64,
     scratch: &mut Model,
 ) -> Result<Identity, Lost> {
-    let mut found = candidates(solver, case, poles, reference).into_iter();
+    let mut found = candidates(solver, case, reference).into_iter();
     let best = found.next().ok_or(Lost::Overlap { best: 0.0, least: LEAST_OVERLAP })?;
     let most = best.overlap.norm();
     if !(most >= LEAST_OVERLAP) {
@@ -262,8 +298,8 @@ pub fn identify(
         return Ok(Identity { primary: best, partner: None });
     };
     let start = reference.clone();
-    let blend = |t: f64, model: &mut Model| model.blend(nominal, case, t);
-    let end = follow(solver, start, scratch, Some(poles), blend)?;
+    let blend = |t: f64, model: &mut Model| model.blend(nominal, case.model, t);
+    let end = follow(solver, start, scratch, Some(case.poles), blend)?;
     // The path ends in the case itself, so that its last pole is one of the case's, bit for bit.
     let at_end = |candidate: &Candidate| candidate.reference.pair.pole == end.pair.pole;
     if at_end(&best) {
@@ -392,8 +428,9 @@ mod tests {
         let mut poles = Vec::new();
         solver.poles(&crossed, &mut poles).expect("solved");
         let mut scratch = Model::zeros(3);
-        let identity = identify(&mut solver, &start, &nominal, &crossed, &poles, 0.5, &mut scratch)
-            .expect("found");
+        let mut case = Solved::new(&crossed, &poles);
+        let identity =
+            identify(&mut solver, &start, &nominal, &mut case, 0.5, &mut scratch).expect("found");
         assert!((identity.primary.reference.pair.pole.im - 1.1).abs() < 1e-3);
         assert!(identity.primary.overlap.norm() > 0.99);
         assert!(identity.partner.is_none());
@@ -408,9 +445,9 @@ mod tests {
         let mut poles = Vec::new();
         solver.poles(&veering, &mut poles).expect("solved");
         let mut scratch = Model::zeros(3);
+        let mut case = Solved::new(&veering, &poles);
         let identity =
-            identify(&mut solver, &start, &nominal, &veering, &poles, 0.05, &mut scratch)
-                .expect("found");
+            identify(&mut solver, &start, &nominal, &mut case, 0.05, &mut scratch).expect("found");
         assert!(identity.partner.is_some());
     }
 

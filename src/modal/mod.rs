@@ -1,6 +1,7 @@
 //! Modes of a linear model: poles, vectors and their identity, and its frequency response.
 
 pub mod eigen;
+pub mod factors;
 pub mod identify;
 pub mod realisation;
 pub mod response;

@@ -1,10 +1,11 @@
 //! The frequency response `C (s − A)⁻¹ B + D` of a state space at any complex frequency.
 //!
-//! One reduction to Hessenberg form per model, then one elimination by columns per frequency, with
-//! no more memory than two columns. What the signals mean, and what follows from the curves, is decided
+//! One reduction to Hessenberg form per model, then one elimination by columns per eight frequencies, with
+//! no more memory than a column and the right-hand sides. What the signals mean, and what follows from the curves, is decided
 //! in `margins`.
 
 use super::eigen::Error;
+use super::spectrum::lanes::{Complex as Lanes, Complexes, Kernel, Level, Vector, WIDTH};
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::evd::hessenberg::{self, HessenbergParams};
 use faer::linalg::evd::{self, ComputeEigenvectors, EvdParams};
@@ -27,43 +28,13 @@ pub struct Response {
     /// CQ, column-major.
     output: DMatrix<f64>,
     direct: DMatrix<f64>,
+    level: Level,
+    /// What is left of the right-hand sides, state by state and input by input.
     right_side: Vec<Complexes>,
-    column: Complexes,
-    next: Complexes,
-    column_output: Vec<Complex<f64>>,
-    next_output: Vec<Complex<f64>>,
-}
-
-/// Complex numbers by parts, which vector instructions prefer.
-#[derive(Debug, Clone, Default)]
-struct Complexes {
-    re: Vec<f64>,
-    im: Vec<f64>,
-}
-
-impl Complexes {
-    fn zeros(count: usize) -> Self {
-        Self { re: vec![0.0; count], im: vec![0.0; count] }
-    }
-
-    fn at(&self, index: usize) -> Complex<f64> {
-        Complex::new(self.re[index], self.im[index])
-    }
-
-    fn set_real(&mut self, values: &[f64]) {
-        self.re[..values.len()].copy_from_slice(values);
-        self.im[..values.len()].fill(0.0);
-    }
-
-    /// Takes `factor` times the first `count` numbers of `other` from the first of these.
-    fn subtract(&mut self, factor: Complex<f64>, other: &Self, count: usize) {
-        let to = self.re[..count].iter_mut().zip(&mut self.im[..count]);
-        let from = other.re[..count].iter().zip(&other.im[..count]);
-        for ((re, im), (x, y)) in to.zip(from) {
-            *re -= factor.re * x - factor.im * y;
-            *im -= factor.re * y + factor.im * x;
-        }
-    }
+    /// What is left of a column, state by state, then output by output.
+    column: Vec<Complexes>,
+    /// The response, column-major.
+    found: Vec<Complexes>,
 }
 
 impl Response {
@@ -112,11 +83,10 @@ impl Response {
             input: outside.rows(p, m).transpose(),
             output: outside.rows(0, p).into_owned(),
             direct: d.clone(),
-            right_side: vec![Complexes::zeros(n); m],
-            column: Complexes::zeros(n),
-            next: Complexes::zeros(n),
-            column_output: vec![Complex::default(); p],
-            next_output: vec![Complex::default(); p],
+            level: Level::best(),
+            right_side: vec![Complexes::ZERO; n * m],
+            column: vec![Complexes::ZERO; n + p],
+            found: vec![Complexes::ZERO; p * m],
         })
     }
 
@@ -157,57 +127,100 @@ impl Response {
         Ok(poles.filter(|pole| pole.im >= 0.0).collect())
     }
 
-    /// The response at the complex frequency `s`, rad/s, written into `response`, p×m.
+    /// The responses at the complex frequencies `points`, rad/s, each p×m.
     ///
     /// Columns of `s − H` are eliminated from the last, each by its neighbour with the larger pivot
     /// (`(s − H) R = T`, T upper triangular); `T Y = B` and `C R Y` are taken along. At a pole the
-    /// result is not finite.
-    pub fn at(&mut self, s: Complex<f64>, response: &mut DMatrix<Complex<f64>>) {
-        let n = self.states;
-        for (to, from) in response.iter_mut().zip(&self.direct) {
-            *to = Complex::new(*from, 0.0);
+    /// result is not finite. What else is asked for in one call does not change a result.
+    pub fn at(&mut self, points: &[Complex<f64>]) -> Vec<DMatrix<Complex<f64>>> {
+        let (p, m) = self.direct.shape();
+        let mut responses = Vec::with_capacity(points.len());
+        for chunk in points.chunks(WIDTH) {
+            let mut s = Complexes::ZERO;
+            for lane in 0..WIDTH {
+                let point = chunk[lane.min(chunk.len() - 1)];
+                (s.re[lane], s.im[lane]) = (point.re, point.im);
+            }
+            self.level.run(Elimination { response: self, s });
+            responses.extend((0..chunk.len()).map(|lane| {
+                DMatrix::from_fn(p, m, |row, column| {
+                    let found = &self.found[column * p + row];
+                    Complex::new(found.re[lane], found.im[lane])
+                })
+            }));
+        }
+        responses
+    }
+}
+
+/// The response at eight frequencies at once.
+struct Elimination<'a> {
+    response: &'a mut Response,
+    s: Complexes,
+}
+
+impl Kernel for Elimination<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Response { states, columns, input, output, direct, right_side, column, found, .. } =
+            self.response;
+        let (n, [p, m]) = (*states, [direct.nrows(), direct.ncols()]);
+        let real = |value: f64| Lanes::<V>::splat(value, 0.0);
+        let s = Lanes::<V>::load(&self.s);
+        for (to, from) in found.iter_mut().zip(direct.as_slice()) {
+            real(*from).store(to);
+        }
+        for state in 0..n {
+            for k in 0..m {
+                real(input[(state, k)]).store(&mut right_side[state * m + k]);
+            }
         }
         if n == 0 {
             return;
         }
-        for (to, from) in self.right_side.iter_mut().zip(self.input.column_iter()) {
-            to.set_real(from.as_slice());
+        for (to, from) in column.iter_mut().zip(&columns[(n - 1) * n..]) {
+            real(*from).store(to);
         }
-        let Self { columns, output, right_side, column, next, column_output, next_output, .. } =
-            self;
-        let load = |index: usize, rows: usize, to: &mut Complexes, out: &mut [Complex<f64>]| {
-            to.set_real(&columns[index * n..index * n + rows]);
-            to.re[index] += s.re;
-            to.im[index] += s.im;
-            for (to, from) in out.iter_mut().zip(output.column(index).iter()) {
-                *to = Complex::new(*from, 0.0);
-            }
-        };
-        load(n - 1, n, column, column_output);
+        Lanes::<V>::load(&column[n - 1]).add(s).store(&mut column[n - 1]);
+        for row in 0..p {
+            real(output[(row, n - 1)]).store(&mut column[n + row]);
+        }
         for last in (0..n).rev() {
-            if last > 0 {
-                load(last - 1, last + 1, next, next_output);
-                if next.at(last).norm_sqr() > column.at(last).norm_sqr() {
-                    std::mem::swap(column, next);
-                    std::mem::swap(column_output, next_output);
-                }
+            let own = Lanes::<V>::load(&column[last]);
+            // The neighbour on the left, whose place on the subdiagonal has no s.
+            let left = if last > 0 { &columns[(last - 1) * n..][..n] } else { &[][..] };
+            let zero = real(0.0);
+            let beside = if last > 0 { real(left[last]) } else { zero };
+            let (a, b) = (beside.square(), own.square());
+            let reciprocal = Lanes::where_greater(a, b, beside, own).reciprocal();
+            let factor = Lanes::where_greater(a, b, own, beside).mul(reciprocal);
+            let (above, from) = right_side.split_at_mut(last * m);
+            for y in &mut from[..m] {
+                Lanes::<V>::load(y).mul(reciprocal).store(y);
             }
-            let reciprocal = column.at(last).inv();
-            for (input, right) in right_side.iter_mut().enumerate() {
-                let y = right.at(last) * reciprocal;
-                right.subtract(y, column, last);
-                for (row, value) in column_output.iter().enumerate() {
-                    response[(row, input)] += value * y;
+            for i in 0..last {
+                let shift = if i + 1 == last { s } else { zero };
+                let (mine, next) = (Lanes::load(&column[i]), real(left[i]).add(shift));
+                let pivot = Lanes::where_greater(a, b, next, mine);
+                let other = Lanes::where_greater(a, b, mine, next);
+                for (right, y) in above[i * m..(i + 1) * m].iter_mut().zip(&*from) {
+                    let value = Lanes::<V>::load(right);
+                    value.subtract_product(Lanes::load(y), pivot).store(right);
                 }
+                other.subtract_product(factor, pivot).store(&mut column[i]);
             }
-            if last > 0 {
-                let factor = next.at(last) * reciprocal;
-                next.subtract(factor, column, last);
-                for (to, from) in next_output.iter_mut().zip(column_output.iter()) {
-                    *to -= factor * from;
+            for row in 0..p {
+                let mine = Lanes::load(&column[n + row]);
+                let next = if last > 0 { real(output[(row, last - 1)]) } else { zero };
+                let pivot = Lanes::where_greater(a, b, next, mine);
+                let other = Lanes::where_greater(a, b, mine, next);
+                for (k, y) in from[..m].iter().enumerate() {
+                    let to = &mut found[k * p + row];
+                    Lanes::<V>::load(to).add(pivot.mul(Lanes::load(y))).store(to);
                 }
-                std::mem::swap(column, next);
-                std::mem::swap(column_output, next_output);
+                other.subtract_product(factor, pivot).store(&mut column[n + row]);
             }
         }
     }
@@ -298,11 +311,12 @@ mod tests {
     fn check(matrices: [&DMatrix<f64>; 4], frequencies: &[Complex<f64>]) {
         let [a, b, c, d] = matrices;
         let mut response = Response::new(a, b, c, d).expect("finite");
-        let mut found = DMatrix::zeros(c.nrows(), b.ncols());
-        for &s in frequencies {
-            response.at(s, &mut found);
+        // One more than two groups, so that lanes are idle and full.
+        let points: Vec<_> = frequencies.iter().copied().cycle().take(17).collect();
+        for (s, found) in points.iter().copied().zip(response.at(&points)) {
+            assert_eq!(found, response.at(&[s])[0]);
             let (expected, error) = dense(matrices, s);
-            let off = (&found - &expected).norm();
+            let off = (found - &expected).norm();
             let bound = 10.0 * a.nrows() as f64 * f64::EPSILON * (error + expected.norm());
             assert!(off <= bound, "{s}: {off:.2e} > {bound:.2e}");
         }
@@ -332,10 +346,9 @@ mod tests {
         let b = DMatrix::from_row_slice(4, 1, &[0., 0., 1., 1.]);
         let c = DMatrix::from_row_slice(1, 4, &[1., 1., 0., 0.]);
         let mut response = Response::new(&a, &b, &c, &DMatrix::zeros(1, 1)).expect("finite");
-        let mut found = DMatrix::zeros(1, 1);
         for omega in [1e-6, 1e-2, 0.999, 1.0, 50.0] {
             let s = Complex::new(0.0, omega);
-            response.at(s, &mut found);
+            let found = &response.at(&[s])[0];
             let expected = 1.0 / (s * s) + 1.0 / (s * s + 0.01 * s + 1.0);
             assert!((found[(0, 0)] - expected).norm() < 1e-13 * expected.norm(), "{omega}");
         }
@@ -355,10 +368,9 @@ mod tests {
         let b = DMatrix::from_row_slice(4, 1, &[0.0, 1.0, 0.0, 1.0]);
         let c = DMatrix::from_row_slice(2, 4, &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
         let mut response = Response::new(&a, &b, &c, &DMatrix::zeros(2, 1)).expect("finite");
-        let mut found = DMatrix::zeros(2, 1);
         for omega in [0.1, 2.99, 4.0, 5.0] {
             let s = Complex::new(0.0, omega);
-            response.at(s, &mut found);
+            let found = &response.at(&[s])[0];
             let second = 1.0 / (s * s + 0.05 * s + 25.0);
             let first = (1.0 + second) / (s * s + 0.03 * s + 9.0);
             for (found, expected) in [(found[(0, 0)], first), (found[(1, 0)], second)] {
@@ -386,9 +398,8 @@ mod tests {
         let b = DMatrix::from_row_slice(2, 1, &[0.0, 1.0]);
         let c = DMatrix::from_row_slice(1, 2, &[1e-12, 0.0]);
         let mut response = Response::new(&a, &b, &c, &DMatrix::zeros(1, 1)).expect("finite");
-        let mut found = DMatrix::zeros(1, 1);
         let s = Complex::new(0.0, 2.0);
-        response.at(s, &mut found);
+        let found = &response.at(&[s])[0];
         let expected = 1.0 / ((s + 1.0) * (s + 3.0));
         assert!((found[(0, 0)] - expected).norm() < 8.0 * f64::EPSILON * expected.norm());
     }

@@ -10,11 +10,15 @@ const SHOWN: usize = 10;
 pub fn text(audit: &Audit) -> String {
     let Audit { cases, evaluations, fallbacks, poles, .. } = *audit;
     let mut text = format!(
-        "audit: {cases} cases both ways, {evaluations} evaluations ({fallbacks} of them dense in both), {poles} \
-         poles; largest difference {:.1e}, largest bound {:.1e} of the modulus: {}\n",
+        "audit: {cases} cases both ways, {evaluations} evaluations compared (without certificate, dense both ways: \
+         {fallbacks}), {poles} poles; largest difference {:.1e}, largest bound {:.1e} of the modulus: {}\n",
         audit.largest,
         audit.largest_bound,
-        if audit.disagreements.is_empty() { "agreed" } else { "NOT agreed" }
+        match (audit.disagreements.is_empty(), audit.poles) {
+            (true, 0) => "nothing to compare",
+            (true, _) => "agreed",
+            (false, _) => "NOT agreed",
+        }
     );
     for disagreement in audit.disagreements.iter().take(SHOWN) {
         let _ = writeln!(text, "  {disagreement}");

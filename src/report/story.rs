@@ -5,9 +5,8 @@
 
 use super::significant;
 use crate::campaign::summary::{Group, LEVELS, SummaryRow, WorstRow};
-use crate::campaign::{Definition, Outline, Population};
+use crate::campaign::{Definition, Outline, Population, Sample};
 use crate::dispersion::Scheme;
-use crate::stats::Drawing;
 use comfy_table::{CellAlignment, Table, presets};
 use std::fmt::Write;
 
@@ -93,13 +92,8 @@ fn claims<'a>(
             significant(100.0 - 5.0 / intervals as f64)
         )
     } else {
-        match (population.drawing(), population.scheme.replicates()) {
-            (Drawing::LatinHypercube | Drawing::LowDiscrepancy, 1) => {
-                "no intervals: one replicate shows nothing of its error; give `replicates`".into()
-            }
-            (Drawing::Independent, _) => "no intervals: no case has a result".into(),
-            (drawing, _) => format!("no intervals: these cases are {}", drawing.describe()),
-        }
+        let without = Sample::of(population).without_intervals(population.cases as usize);
+        without.unwrap_or_else(|| "no intervals: no case has a result".into())
     };
     for row in rows.filter(|row| row.group.flight_time.is_none()) {
         let (Some(outer), Scheme::Nested { inner, allowed_share, risk, .. }) =

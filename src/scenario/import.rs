@@ -27,6 +27,8 @@ use std::collections::BTreeSet;
 
 /// Cosine of the angle between the given `aft` and `y` above which they are refused.
 const SKEW: f64 = 1e-4;
+/// Ratio of a declared mass to that of the files beyond which it is a slip of units.
+const MASS_SLIP: f64 = 10.0;
 /// Departure of a declared mass from that of the files above which it is reported.
 const MASS_APART: f64 = 0.02;
 /// Agreement of the grids' masses with the body's above which they must weigh the modes too.
@@ -365,10 +367,20 @@ impl Resolver<'_> {
                 }
             },
         };
+        let engines = self.engine_mass_kg();
+        if self.file.body.kind == BodyKind::Integrated && !(engines < body.mass_kg) {
+            let found = format!("{engines} kg of engines in {:.5e} kg", body.mass_kg);
+            self.push("body.engine", found, "engines lighter than the body that contains them");
+        }
         for (by, found) in estimates {
             self.compare(&key, time.time_s, &body, by, found);
         }
         Some(body)
+    }
+
+    /// Mass of the engines declared with theirs, kg.
+    fn engine_mass_kg(&self) -> f64 {
+        self.file.body.engine.iter().filter_map(|e| e.mass_kg).sum()
     }
 
     /// Compares the mass properties of the package with those that the files hold, and tells a
@@ -382,7 +394,7 @@ impl Resolver<'_> {
         found: &MassProperties,
     ) {
         let declared = &self.file.body;
-        let engines: f64 = declared.engine.iter().filter_map(|e| e.mass_kg).sum();
+        let engines = self.engine_mass_kg();
         let (other, word) = match declared.kind {
             BodyKind::Reduced => (body.mass_kg + engines, "with the engines"),
             BodyKind::Integrated => (body.mass_kg - engines, "without the engines"),
@@ -404,7 +416,12 @@ impl Resolver<'_> {
                 "the {by} give {:.5e} kg, the package says {:.5e} kg",
                 found.mass_kg, body.mass_kg
             );
-            self.warn(time_s, said);
+            let ratio = found.mass_kg / body.mass_kg;
+            if (1.0 / MASS_SLIP..=MASS_SLIP).contains(&ratio) {
+                self.warn(time_s, said);
+            } else {
+                self.push(key, said, "masses of one model in the units declared");
+            }
         }
         let radius = (body.inertia_kg_m2.trace() / body.mass_kg).sqrt();
         let moved = (found.cg_m - body.cg_m).norm();

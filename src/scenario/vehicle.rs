@@ -150,7 +150,7 @@ impl<'a> Resolver<'a> {
         /// Key, values, what holds for each, and that in words.
         type Table<'a> = (&'a str, &'a [f64], fn(f64) -> bool, &'a str);
         let tables: [Table; 3] = [
-            ("thrust_n", &file.thrust_n, |x| x > 0.0, "numbers > 0"),
+            ("thrust_n", &file.thrust_n, |x| x >= 0.0, "numbers ≥ 0"),
             ("mass_flow_kg_s", &file.mass_flow_kg_s, |x| x >= 0.0, "numbers ≥ 0"),
             ("burned_fraction", burned, |x| (0.0..=1.0).contains(&x), "numbers from 0 to 1"),
         ];
@@ -165,6 +165,13 @@ impl<'a> Resolver<'a> {
                 self.findings.push(format!("{key}.{name}[{i}]"), value.to_string(), allowed);
                 good = false;
             }
+        }
+        let flows = file.thrust_n.iter().zip(&file.mass_flow_kg_s);
+        if let Some(i) = flows.into_iter().position(|(thrust, flow)| *thrust == 0.0 && *flow > 0.0)
+        {
+            let key = format!("{key}.mass_flow_kg_s[{i}]");
+            self.findings.push(key, file.mass_flow_kg_s[i].to_string(), "0 where the thrust is 0");
+            good = false;
         }
         if let Some(i) = burned.windows(2).position(|w| good && w[0] > w[1]) {
             let found = format!("{} after {}", burned[i + 1], burned[i]);

@@ -35,10 +35,14 @@ impl Motor {
         interpolate(&self.time_s, &self.burned_fraction, time_s)
     }
 
-    /// Ratio of the tabulated mass flow to R/(Isp g) at `time_s`, −: the nominal flow profile.
+    /// Ratio of the tabulated mass flow to R/(Isp g) at `time_s`, −: the nominal flow profile. One where there is
+    /// neither.
     pub fn flow_profile_at(&self, time_s: f64) -> f64 {
-        self.mass_flow_at(time_s) * self.specific_impulse_s * STANDARD_GRAVITY_M_S2
-            / self.thrust_at(time_s)
+        let thrust_n = self.thrust_at(time_s);
+        if thrust_n == 0.0 {
+            return 1.0;
+        }
+        self.mass_flow_at(time_s) * self.specific_impulse_s * STANDARD_GRAVITY_M_S2 / thrust_n
     }
 }
 

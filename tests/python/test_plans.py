@@ -400,6 +400,32 @@ def test_influences_are_means_of_stored_derivatives_and_agree_with_regression(ru
         assert np.sign(swing) == np.sign(by.mean())
 
 
+@pytest.mark.parametrize("plan, replicates", [
+    ('kind = "latin_hypercube"\nreplicates = 4', 4),
+    ('kind = "sobol"\nreplicates = 4', 4),
+    ('kind = "sobol"', 1),
+])
+def test_influences_of_designs_have_students_intervals_over_replicates_or_say_how_to_get_them(
+    runs, folder, plan, replicates
+):
+    name = f"influence_{plan.split(chr(34))[1]}_{replicates}"
+    run = runs(name, scenario("small", 64, plan) + "\n[sensitivity]\n")
+    text = tvse("influence", run.folder)
+    rows = list(csv.DictReader((run.folder / "analysis/influence.csv").open()))
+    if replicates == 1:
+        assert "`replicates = 8`" in text and all(row["mean_low"] == "" for row in rows)
+        return
+    assert "no intervals" not in text
+    modes = run.table("modes").query("population == 'dispersed' and branch == 'primary'").sort_values("case")
+    for row in rows:
+        by = modes[modes.variant == row["variant"]]["ddr_" + run.columns[row["key"]].removeprefix("draw_")].to_numpy()
+        for values, what in [(by, "mean"), (abs(by), "mean_modulus")]:
+            means = [values[turn::replicates].mean() for turn in range(replicates)]
+            low, high = scipy.stats.ttest_1samp(means, 0).confidence_interval(0.95)
+            found = (float(row[f"{what}_low"]), float(row[f"{what}_high"]))
+            assert found == pytest.approx((low, high), rel=1e-9)
+
+
 def test_crossed_indices_are_the_estimators_and_agree_with_openturns(runs, folder):
     run = runs("small_saltelli", scenario("small", None, 'kind = "saltelli"\nrows = 120'))
     rows = lines("sensitivity", run.folder, "--metric", METRIC, "-o", folder / "c.csv")
@@ -487,8 +513,9 @@ rationale = "refused"
     command = [TVSE, "gate", run.folder, "--gates", folder / "claim.gates.toml"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 2 and "low-discrepancy sequence" in done.stderr
-    text = tvse("how-many", "--coverage", 0.9, "--risk", 0.1, "--run", run.folder)
-    assert "dispersed: no claim" in text and "low-discrepancy sequence" in text
+    command = [TVSE, "how-many", "--coverage", "0.9", "--risk", "0.1", "--run", run.folder]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 2 and "no claim" in done.stderr and "low-discrepancy sequence" in done.stderr
 
 
 def test_runs_are_compared_on_common_draws_alone(small, runs, folder):

@@ -32,6 +32,8 @@ pub struct Back<'a> {
     pub effects: &'a [Affine],
     /// Per parameter, whether a draw acts on it; the others are left out.
     pub acts: &'a [bool],
+    /// Per engine, whether a draw acts on one of its parameters; the others are left out.
+    pub engines: &'a [bool],
     /// The plant.
     pub plant: &'a Plant,
     /// The drawn vehicle.
@@ -59,8 +61,8 @@ impl Slots {
     /// where they cost anything.
     pub fn pull(&self, back: &Back<'_>) -> Vec<AffineGradient> {
         let Back { vehicle, parameters, effects, gradient, plant, drawn, .. } = *back;
-        let mut to = vec![AffineGradient::default(); parameters.count()];
-        let to = &mut to[..];
+        let mut found = vec![AffineGradient::default(); parameters.count()];
+        let to = &mut found[..];
         let time_s = self.flight_time_s;
 
         let common = effects[self.structural_damping].apply(vehicle.structural_damping);
@@ -107,7 +109,7 @@ impl Slots {
                 back.give(to, whole(quantity), interpolate(&air.time_s, table, time_s), by);
             }
         }
-        for slots in &self.engines {
+        for slots in self.engines.iter().filter(|slots| back.engines[slots.engine]) {
             self.pull_engine(back, slots.engine, to);
             let by = &gradient.engines[slots.engine];
             for (mode, [shape, slope]) in slots.gains.iter().enumerate() {
@@ -130,7 +132,7 @@ impl Slots {
             }
         }
         debug_assert_eq!(drawn.body.frequency_rad_s.len(), self.modes.len());
-        to.to_vec()
+        found
     }
 
     fn pull_engine(&self, back: &Back<'_>, index: usize, to: &mut [AffineGradient]) {

@@ -114,7 +114,10 @@ pub fn search(
     if plan.corner_keys > MOST_CORNER_KEYS {
         return Err(Error::TooMany { found: plan.corner_keys });
     }
-    let smooth = |law: &Law| law.slope(&Position::of_score(0.0)).is_some_and(|slope| slope > 0.0);
+    let smooth = |law: &Law| {
+        let median = law.value(&Position::of_score(0.0));
+        law.slope(median, 0.0).is_some_and(|slope| slope > 0.0)
+    };
     let free: Vec<bool> = dispersion.draws().iter().map(|draw| smooth(&draw.law)).collect();
     let searcher = |flight_time: usize| Searcher {
         objective: Objective { evaluator, dispersion, aim: plan.aim, flight_time },

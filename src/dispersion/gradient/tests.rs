@@ -109,7 +109,7 @@ fn the_gradient_by_scores_is_what_differences_say() {
             AffineGradient { scale: c(weight * nominal), offset: c(weight) }
         })
         .collect();
-    let found = dispersion.score_gradient(&draws, &[], &effects);
+    let found = dispersion.chain(&draws, &[]).gradient(&effects);
     for (index, by) in found.iter().enumerate() {
         let at = |shift: f64| {
             let mut z = z.clone();
@@ -137,8 +137,8 @@ fn a_key_that_is_held_does_not_move_with_its_common_score() {
     let draws = sampler.cursor().draw(0, &values, false).clone();
     let one = AffineGradient { scale: Complex::new(1.0, 0.0), offset: Complex::new(0.0, 0.0) };
     let effects = vec![one; dispersion.parameters().count()];
-    let held = dispersion.score_gradient(&draws, &values, &effects);
-    let free = dispersion.score_gradient(&draws, &[], &effects);
+    let held = dispersion.chain(&draws, &values).gradient(&effects);
+    let free = dispersion.chain(&draws, &[]).gradient(&effects);
     assert_eq!(held[common], Some(Complex::ZERO));
     assert!(free[common].unwrap().re > 0.0);
 }
@@ -165,7 +165,7 @@ fn a_key_that_stays_nominal_counts_as_one_at_its_median() {
     let nominal = sampler.cursor().draw(0, &[], false).clone();
     let one = AffineGradient { scale: Complex::new(1.0, 0.0), offset: Complex::new(0.0, 0.0) };
     let effects = vec![one; dispersion.parameters().count()];
-    let found = dispersion.score_gradient(&nominal, &[], &effects);
+    let found = dispersion.chain(&nominal, &[]).gradient(&effects);
     let lognormal = dispersion.draws().iter().position(|d| d.key.ends_with("# b")).unwrap();
     // One engine, factor of median 1 and slope σ_ln there.
     assert!((found[lognormal].unwrap().re - 0.05).abs() < 1e-12);

@@ -223,13 +223,17 @@ fn at(plant: &Plant, drawn: &DrawnVehicle, effects: &Effects) -> [Vec<C>; 2] {
     vectors(&model)
 }
 
+/// Every engine is asked for.
+const ALL: [bool; 8] = [true; 8];
+
 #[test]
 fn the_parts_of_all_effects_add_up_to_the_form_of_the_matrices() {
     let drawn = drawn();
     for (plant, effects) in variants() {
         let pair = at(&plant, &drawn, &effects);
         let vectors = Vectors { s: S, left: &pair[0], right: &pair[1] };
-        let value = plant.gradient(&drawn, &effects, &vectors).value;
+        let value =
+            plant.gradient(&drawn, &effects, &vectors, &ALL[..plant.attachments.len()]).value;
         let expected = form(&plant, &drawn, &effects, &pair);
         // Every coordinate contributes of the order of one.
         assert!((value - expected).norm() < 1e-12 * pair[0].len() as f64, "{value} {expected}");
@@ -242,7 +246,7 @@ fn the_gradient_by_every_number_is_what_differences_of_the_matrices_say() {
         let drawn = drawn();
         let pair = at(&plant, &drawn, &effects);
         let vectors = Vectors { s: S, left: &pair[0], right: &pair[1] };
-        let gradient = plant.gradient(&drawn, &effects, &vectors);
+        let gradient = plant.gradient(&drawn, &effects, &vectors, &ALL[..plant.attachments.len()]);
         let rigid = !plant.layout.rotation().is_empty();
         let numbers = NUMBERS.iter().chain(RIGID_NUMBERS.iter().filter(|_| rigid));
         let mut felt = 0;
@@ -273,7 +277,7 @@ fn an_actuator_has_its_spring_and_damper_in_the_form() {
     let drawn = drawn();
     let pair = at(&plant, &drawn, &effects);
     let vectors = Vectors { s: S, left: &pair[0], right: &pair[1] };
-    let gradient = plant.gradient(&drawn, &effects, &vectors);
+    let gradient = plant.gradient(&drawn, &effects, &vectors, &ALL[..plant.attachments.len()]);
     let other = DrawnActuator::spring(3.0e7, 7.0e5);
     let mut changed = drawn.clone();
     changed.engines[0].actuators[0][1] = other.clone();

@@ -73,6 +73,17 @@ impl Pattern {
         self.bits[row * self.words + column / 64] |= 1 << (column % 64);
     }
 
+    /// Sets the columns from `first` on and before `end`.
+    #[inline(always)]
+    fn set_from(&mut self, row: usize, first: usize, end: usize) {
+        for word in first / 64..self.words {
+            let low = u64::MAX << first.saturating_sub(64 * word);
+            let count = end - 64 * word;
+            let high = if count < 64 { (1 << count) - 1 } else { u64::MAX };
+            self.bits[row * self.words + word] |= low & high;
+        }
+    }
+
     /// The next column of a row from `first` on; beyond the last where there is none.
     #[inline(always)]
     fn next(&self, row: usize, first: usize) -> usize {
@@ -170,9 +181,7 @@ impl Elimination {
             self.matrix[row * n + from..row * n + next].fill(Complexes::ZERO);
             from = next + 1;
         }
-        for column in first..n {
-            self.filled.set(row, column);
-        }
+        self.filled.set_from(row, first, n);
     }
 
     /// Eliminates a sparse column: rows that have an element there are combined with the pivot's at once.

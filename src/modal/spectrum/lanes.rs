@@ -46,6 +46,8 @@ pub trait Vector: Copy {
     fn max(self, other: Self) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
+    /// `yes` where this is greater than `other`, else `no`.
+    fn where_greater(self, other: Self, yes: Self, no: Self) -> Self;
     /// Absolute value.
     #[inline(always)]
     fn abs(self) -> Self {
@@ -125,6 +127,12 @@ impl<V: Vector> Complex<V> {
         Self { re: self.re.mul(factor), im: self.im.mul(factor) }
     }
 
+    /// `yes` where `a` is greater than `b`, else `no`.
+    #[inline(always)]
+    pub fn where_greater(a: V, b: V, yes: Self, no: Self) -> Self {
+        Self { re: a.where_greater(b, yes.re, no.re), im: a.where_greater(b, yes.im, no.im) }
+    }
+
     /// Square of the modulus.
     #[inline(always)]
     pub fn square(self) -> V {
@@ -194,6 +202,11 @@ impl Vector for Portable {
     #[inline(always)]
     fn sqrt(self) -> Self {
         self.with(self, |a, _| a.sqrt())
+    }
+    #[inline(always)]
+    fn where_greater(self, other: Self, yes: Self, no: Self) -> Self {
+        let of = |lane: usize| if self.0[lane] > other.0[lane] { yes.0[lane] } else { no.0[lane] };
+        Self(std::array::from_fn(of))
     }
 }
 
@@ -341,6 +354,14 @@ mod x86 {
         fn sqrt(self) -> Self {
             unsafe { Self(_mm256_sqrt_pd(self.0), _mm256_sqrt_pd(self.1)) }
         }
+        #[inline(always)]
+        fn where_greater(self, other: Self, yes: Self, no: Self) -> Self {
+            unsafe {
+                let low = _mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0);
+                let high = _mm256_cmp_pd::<_CMP_GT_OQ>(self.1, other.1);
+                Self(_mm256_blendv_pd(no.0, yes.0, low), _mm256_blendv_pd(no.1, yes.1, high))
+            }
+        }
     }
 
     impl Vector for Avx512 {
@@ -387,6 +408,13 @@ mod x86 {
         #[inline(always)]
         fn sqrt(self) -> Self {
             unsafe { Self(_mm512_sqrt_pd(self.0)) }
+        }
+        #[inline(always)]
+        fn where_greater(self, other: Self, yes: Self, no: Self) -> Self {
+            unsafe {
+                let greater = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0);
+                Self(_mm512_mask_blend_pd(greater, no.0, yes.0))
+            }
         }
     }
 }

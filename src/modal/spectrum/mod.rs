@@ -21,7 +21,7 @@ use super::{Solver, eigen};
 use crate::dynamics::Model;
 use faer::c64;
 
-/// Coordinates beyond which elimination at every pole costs more than a dense solve.
+/// Second-order coordinates beyond which elimination at every pole costs more than a dense solve.
 const MOST_COORDINATES: usize = 64;
 /// Rounds of evaluations before a spectrum is given up.
 const MOST_ROUNDS: usize = 6;
@@ -51,7 +51,9 @@ impl Base {
     /// are too sensitive for discs, would only cost determinants before the dense solver answers.
     pub fn proven(model: &Model, solver: &mut Solver) -> Option<Self> {
         let size = model.coordinates();
-        let base = (size <= MOST_COORDINATES).then(|| Self::of(model, solver).ok()).flatten()?;
+        let base = (model.second_order <= MOST_COORDINATES)
+            .then(|| Self::of(model, solver).ok())
+            .flatten()?;
         Spectrum::new(size).solve(&base, model).is_ok().then_some(base)
     }
 }

@@ -17,6 +17,10 @@ pub struct Pencil {
     entries: Vec<[f64; 3]>,
     /// Null states divided out of each column.
     degree: Vec<usize>,
+    /// The coordinate at each place.
+    order: Vec<usize>,
+    /// Entries of first-order rows and columns that are not zero, for which the order is.
+    nonzero: Vec<bool>,
     /// Determinant of the mass matrix, the leading coefficient.
     leading: Scaled,
     /// Bound of its relative error.
@@ -39,6 +43,8 @@ impl Pencil {
             size,
             entries: vec![[0.0; 3]; size * size],
             degree: vec![0; size],
+            order: Vec::new(),
+            nonzero: Vec::new(),
             leading: Scaled::ONE,
             leading_error: 0.0,
             elimination: Elimination::new(size),
@@ -55,18 +61,19 @@ impl Pencil {
     pub fn set(&mut self, model: &Model) -> bool {
         let (size, n) = (self.size, model.second_order);
         let states = size - n;
-        for column in 0..size {
-            let from = (column + n) % size;
+        self.arrange(model);
+        for (column, &from) in self.order.iter().enumerate() {
             let null = |state| usize::from(model.null_states.contains(&state));
             let degree = if from < n { null(from) + null(n + from) } else { 0 };
             self.degree[column] = degree;
-            for row in 0..size {
-                let at = ((row + n) % size, from);
-                let [m, d, k] = [model.mass[at], model.damping[at], model.stiffness[at]];
-                self.entries[row * size + column] = match degree {
-                    0 => [m, d, k],
-                    1 => [m, d, 0.0],
-                    _ => [m, 0.0, 0.0],
+            let [m, d, k] = [&model.mass, &model.damping, &model.stiffness]
+                .map(|matrix| matrix.col_as_slice(from));
+            let rows = self.entries.iter_mut().skip(column).step_by(size);
+            for (entry, &to) in rows.zip(&self.order) {
+                *entry = match degree {
+                    0 => [m[to], d[to], k[to]],
+                    1 => [m[to], d[to], 0.0],
+                    _ => [m[to], 0.0, 0.0],
                 };
             }
         }
@@ -82,6 +89,54 @@ impl Pencil {
         let entries = &self.entries;
         self.elimination.shape(states, |row, column| entries[row * size + column] != [0.0; 3]);
         self.entries.iter().flatten().all(|value| value.is_finite()) && self.lead(model)
+    }
+
+    /// Puts the first-order states first, in an order in which eliminating them fills in little (Markowitz: the
+    /// least product of what is left of row and column), as long as pivots are on the diagonal.
+    fn arrange(&mut self, model: &Model) {
+        let (size, n) = (self.size, model.second_order);
+        let entry = |row: usize, column: usize| {
+            let has = |matrix: &faer::Mat<f64>| matrix.col_as_slice(column)[row] != 0.0;
+            row == column || has(&model.stiffness) || has(&model.damping)
+        };
+        let states = (n..size).flat_map(|state| (0..size).map(move |other| (state, other)));
+        let both = || states.clone().flat_map(|(a, b)| [(a, b), (b, a)]);
+        let known = self.order.len() == size && self.nonzero.len() == 2 * (size - n) * size;
+        if known && both().zip(&self.nonzero).all(|((a, b), known)| entry(a, b) == *known) {
+            return;
+        }
+        self.nonzero.clear();
+        self.nonzero.extend(both().map(|(a, b)| entry(a, b)));
+        let mut filled = vec![false; size * size];
+        for (row, column) in both() {
+            filled[row * size + column] = entry(row, column);
+        }
+        let mut left: Vec<usize> = (n..size).collect();
+        self.order.clear();
+        while !left.is_empty() {
+            let others = |state: usize| {
+                let active = |other: &usize| *other < n || left.contains(other);
+                (0..size).filter(active).filter(move |other| *other != state)
+            };
+            let product = |state: &usize| {
+                let row = others(*state).filter(|other| filled[state * size + other]).count();
+                let column = others(*state).filter(|other| filled[other * size + state]).count();
+                row * column
+            };
+            let (at, _) =
+                left.iter().map(product).enumerate().min_by_key(|(_, p)| *p).unwrap_or((0, 0));
+            let state = left[at];
+            let rows: Vec<usize> = others(state).filter(|o| filled[o * size + state]).collect();
+            let columns: Vec<usize> = others(state).filter(|o| filled[state * size + o]).collect();
+            for &row in &rows {
+                for &column in &columns {
+                    filled[row * size + column] = true;
+                }
+            }
+            left.remove(at);
+            self.order.push(state);
+        }
+        self.order.extend(0..n);
     }
 
     /// The determinant of the mass matrix by Cholesky, on a unit diagonal: there the elements of |R||Rᵀ| are

@@ -525,6 +525,11 @@ fn a_declared_mass_tells_a_reduced_body_from_an_integrated_one() {
     assert!(wrong.contains("of a body without the engines"), "{wrong}");
     let doubtful = says(6300.0, "reduced").unwrap().warnings;
     assert!(doubtful.iter().any(|w| w.contains("give 6.00000e3 kg, the package says")));
+    let slipped = says(60.0, "reduced").unwrap_err().to_string();
+    assert!(slipped.contains("give 6.00000e3 kg, the package says 6.00000e1 kg"), "{slipped}");
+    let heavy = declare(6000.0, "integrated").replace("mass_kg = 900", "mass_kg = 9000");
+    let heavy = import(&heavy, vec![results(&PLAIN)]).unwrap_err().to_string();
+    assert!(heavy.contains("9000 kg of engines in 6.00000e3 kg"), "{heavy}");
 }
 
 #[test]

@@ -232,7 +232,9 @@ fn motor_tables_must_be_whole_and_physical() {
     for (from, to, key) in [
         ("[20.0, 52.0, 70.0", "[20.0, 72.0, 70.0", "motor[0].time_s[2]"),
         ("[16.25e6, 13.00e6,", "[13.00e6,", "motor[0].thrust_n"),
-        ("[16.25e6,", "[0.0,", "motor[0].thrust_n[0]"),
+        ("[16.25e6,", "[-1.0,", "motor[0].thrust_n[0]"),
+        // Flow without thrust would be an infinite multiple of R/(Isp g).
+        ("[16.25e6,", "[0.0,", "motor[0].mass_flow_kg_s[0]"),
         ("[6195.0,", "[-1.0,", "motor[0].mass_flow_kg_s[0]"),
         ("[0.1887,", "[1.1887,", "motor[0].burned_fraction[0]"),
         ("motor = \"booster\"", "motor = \"boster\"", "engine[0].motor"),
@@ -365,4 +367,27 @@ proptest! {
         }
         let _ = resolved(&text, modal());
     }
+}
+
+#[test]
+fn an_engine_that_is_out_has_neither_thrust_nor_flow() {
+    let text = VEHICLE.replacen("[16.25e6,", "[0.0,", 1).replacen(
+        "mass_flow_kg_s = [",
+        "mass_flow_kg_s = [0.0, ",
+        1,
+    );
+    let first = |key: &str| {
+        let at = text.find(key).map(|at| &text[at..]).unwrap();
+        at.lines().next().unwrap().to_owned()
+    };
+    // One entry of flow too many now: the second goes.
+    let flow = first("mass_flow_kg_s = [0.0, ");
+    let mut entries: Vec<&str> = flow.split(", ").collect();
+    entries.remove(1);
+    let vehicle = resolved(&text.replacen(&flow, &entries.join(", "), 1), modal()).unwrap().vehicle;
+    let motor = &vehicle.engines[0].motor;
+    let start = motor.time_s[0];
+    assert_eq!((motor.thrust_at(start), motor.mass_flow_at(start)), (0.0, 0.0));
+    assert_eq!(motor.flow_profile_at(start), 1.0);
+    assert!(motor.flow_profile_at(start + 1.0).is_finite());
 }
