@@ -305,11 +305,14 @@ pub fn carry_out(
     options: &Options,
     (pool, jobs): (&Pool, usize),
     interrupt: &Interrupt,
-    results: Results,
+    mut results: Results,
     case: impl Fn(usize, u64) -> Record + Sync,
     out: &mut dyn Write,
 ) -> Result<u8, Error> {
     say_mended(&results);
+    if jobs > 1 {
+        results.write_aside();
+    }
     let missing = results.store().missing();
     let definition = results.store().outline().definition.clone();
     let shown = Shown::new(options.progress, options.save_every);

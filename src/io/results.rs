@@ -13,7 +13,7 @@ use super::lock::Told;
 use super::manifest::{self, Execution, Manifest};
 use super::run::Run;
 use super::schema::{self, TableName};
-use super::shard::Filling;
+use super::shard::{Filling, Shard};
 use super::store::{Access, NEXT, Store, TABLES};
 use super::table::{self, Content, Table};
 use super::{assemble, envelope, summarise};
@@ -22,7 +22,9 @@ use crate::campaign::summary::{SummaryRow, WorstRow};
 use crate::campaign::{Outline, Record};
 use crate::problem::{Kind, Problems};
 use std::collections::{BTreeMap, BTreeSet};
+use std::panic::resume_unwind;
 use std::path::Path;
+use std::thread::JoinHandle;
 use std::time::SystemTime;
 
 /// The results of a run that is under way.
@@ -30,9 +32,30 @@ use std::time::SystemTime;
 /// Dropped before [`Results::finish`] has succeeded it leaves the shards that are written, from
 /// which the run goes on, and nothing if there are none.
 pub struct Results {
+    // Dropped first: what is being written is written under the store's lock.
+    writing: InFlight,
     store: Store,
     filling: Option<Filling>,
+    aside: bool,
     started: SystemTime,
+}
+
+/// A shard being written by another thread, which is waited for.
+#[derive(Default)]
+struct InFlight(Option<JoinHandle<Result<Shard, Problems>>>);
+
+impl InFlight {
+    fn wait(&mut self) -> Result<Option<Shard>, Problems> {
+        let written = self.0.take().map(JoinHandle::join);
+        written.map(|shard| shard.unwrap_or_else(|panic| resume_unwind(panic))).transpose()
+    }
+}
+
+impl Drop for InFlight {
+    fn drop(&mut self) {
+        // Whether it was written shows when the run is gone on with.
+        let _ = self.0.take().map(JoinHandle::join);
+    }
 }
 
 /// A finished run with the summary that was stored.
@@ -98,12 +121,19 @@ impl Results {
         if let Opening::Extend(more) = opening {
             store.extend(more)?;
         }
-        Ok(Self { store, filling: None, started })
+        Ok(Self { started, ..Self::of(store) })
     }
 
     /// Goes on with a store that was opened otherwise.
     pub fn of(store: Store) -> Self {
-        Self { store, filling: None, started: SystemTime::now() }
+        let (writing, started) = (InFlight::default(), SystemTime::now());
+        Self { writing, store, filling: None, aside: false, started }
+    }
+
+    /// From now on full shards are written by a thread of their own, one at a time, while further
+    /// records are pushed; an error comes with a later call.
+    pub fn write_aside(&mut self) {
+        self.aside = true;
     }
 
     /// The store.
@@ -118,7 +148,7 @@ impl Results {
     /// An input problem if the disk is full or gone.
     pub fn push(&mut self, record: Record) -> Result<(), Problems> {
         if self.filling.as_ref().is_some_and(|filling| !filling.goes_on_with(&record)) {
-            self.checkpoint()?;
+            self.hand_over()?;
         }
         let outline = self.store.outline();
         let filling = match &mut self.filling {
@@ -129,7 +159,7 @@ impl Results {
                 none.insert(filling)
             }
         };
-        if filling.push(outline, record) { self.checkpoint() } else { Ok(()) }
+        if filling.push(outline, record) { self.hand_over() } else { Ok(()) }
     }
 
     /// Writes what was pushed so far to the disk, for good.
@@ -137,10 +167,32 @@ impl Results {
     /// # Errors
     /// An input problem if the disk is full or gone.
     pub fn checkpoint(&mut self) -> Result<(), Problems> {
+        self.hand_over()?;
+        self.wait()
+    }
+
+    /// Writes the shard that was filled, or has it written.
+    fn hand_over(&mut self) -> Result<(), Problems> {
+        self.wait()?;
         let Some(filling) = self.filling.take() else { return Ok(()) };
         let store = &self.store;
+        if self.aside {
+            let (folder, outline) = (store.folder().to_owned(), store.outline().clone());
+            let identity = store.identity().to_owned();
+            let write = move || filling.write(&folder, &outline, &identity);
+            self.writing = InFlight(Some(std::thread::spawn(write)));
+            return Ok(());
+        }
         let shard = filling.write(store.folder(), store.outline(), store.identity())?;
         self.store.add(shard);
+        Ok(())
+    }
+
+    /// Waits for the shard that is being written.
+    fn wait(&mut self) -> Result<(), Problems> {
+        if let Some(shard) = self.writing.wait()? {
+            self.store.add(shard);
+        }
         Ok(())
     }
 
@@ -226,7 +278,7 @@ fn at_once<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<
 
 /// What a thread made, or its panic.
 fn joined<R>(thread: std::thread::ScopedJoinHandle<'_, R>) -> R {
-    thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
 /// Where tables that are made of others are written.
@@ -319,6 +371,32 @@ mod tests {
             assert!(written[0].iter().all(|(_, bytes)| !bytes.is_empty()));
             assert!(written.iter().all(|tables| *tables == written[0]));
         }
+    }
+
+    #[test]
+    fn shards_written_by_a_thread_of_their_own_give_the_same_bytes_and_their_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        let outline = || cases::outline(&CASES, StoredPoles::All);
+        let (plain, aside) = (folder.path().join("plain"), folder.path().join("aside"));
+        synthetic::run(&plain, outline(), 1).unwrap();
+        let mut results = Results::create(&aside, outline()).unwrap();
+        results.write_aside();
+        synthetic::evaluate(results, 2, u64::MAX).unwrap().finish(2, 3).unwrap();
+        assert_eq!(tables(&aside), tables(&plain));
+
+        let gone = folder.path().join("gone");
+        let mut results = Results::create(&gone, outline()).unwrap();
+        results.write_aside();
+        let outline = outline();
+        let record = |population, case| {
+            cases::evaluate(&outline.definition, population, case, outline.poles)
+        };
+        results.push(record(0, 0)).unwrap();
+        fs::remove_dir_all(&gone).unwrap();
+        // The shard of the first population is full here, that it has no place shows when the next is.
+        let pushed = results.push(record(1, 0));
+        let problems = pushed.and_then(|()| results.checkpoint()).unwrap_err();
+        assert!(problems.to_string().contains("gone"), "{problems}");
     }
 
     #[test]

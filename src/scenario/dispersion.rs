@@ -89,7 +89,7 @@ mod tests {
         for key in [
             "comon",
             "row[0].paht",
-            "row[0].law",
+            "row[0].law.kind",
             "row[0].apply",
             "row[1].law.mean",
             "row[1].law.sigmaa",

@@ -158,7 +158,8 @@ impl<'a> Reader<'a> {
                     }
                 };
                 *value = self.placeholder(schema);
-                self.problem_unread(&format!("{key}.{tag}"), found, allowed);
+                self.problem(&format!("{key}.{tag}"), found, allowed);
+                self.leave(key);
             }
         }
     }
@@ -213,6 +214,11 @@ impl<'a> Reader<'a> {
     /// Adds a problem after which the other values of the same table are not judged further.
     fn problem_unread(&mut self, key: &str, found: String, allowed: String) {
         self.problem(key, found, allowed);
+        self.leave(key);
+    }
+
+    /// Leaves the other values of the table unjudged in which `key` stands.
+    fn leave(&mut self, key: &str) {
         let place = match key.rfind('.') {
             Some(dot) => &key[..dot],
             None => key.split('[').next().unwrap_or(key),

@@ -248,7 +248,7 @@ fn plans_that_cannot_be_are_refused_with_their_keys() {
     assert_eq!(with("kind = \"sobol\"\nreplicates = 7"), ["cases"]);
     assert_eq!(with("kind = \"sobol\"\nreplicates = 0"), ["plan.replicates"]);
     assert_eq!(with("kind = \"corners\"\nresolution = 3"), ["cases"]);
-    assert_eq!(with("kind = \"lhs\""), ["plan"]);
+    assert_eq!(with("kind = \"lhs\""), ["plan.kind"]);
     assert_eq!(keys(&edited("cases = 2000", "")), ["cases"]);
     assert_eq!(keys(&planned("kind = \"corners\"")), ["plan.keys"]);
     assert_eq!(keys(&planned("kind = \"one_at_a_time\"\nat = [1, 1]")), ["plan.at"]);
