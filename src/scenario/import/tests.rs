@@ -172,27 +172,31 @@ fn results(style: &Style) -> Results {
         position_system: 0,
         displacement_system: 0,
     });
+    // Displacement axes of a node, in those of the vehicle.
+    let axes = |id: i64, p: &Vector3<f64>| {
+        if ring(id) {
+            let (sin, cos) = angle(p).sin_cos();
+            Matrix3::from_columns(&[
+                Vector3::new(0.0, cos, sin),
+                Vector3::new(0.0, -sin, cos),
+                Vector3::x(),
+            ])
+        } else {
+            style.axes.transpose()
+        }
+    };
     for (j, mode) in physical().iter().enumerate() {
         let greatest = nodes()
             .iter()
-            .map(|(_, p)| (style.axes * (mode.motion)(p).0).amax())
+            .map(|(id, p)| (axes(*id, p).transpose() * (mode.motion)(p).0).amax())
             .fold(0.0, f64::max);
-        // Unit generalised mass in the file's unit, or a greatest translation of 1.
+        // Unit generalised mass in the file's unit, or a greatest component of 1.
         let scale = if style.maximum { 0.999 / greatest } else { units.mass_kg.sqrt() };
         let shape = nodes()
             .iter()
             .map(|(id, p)| {
                 let (u, turn) = (mode.motion)(p);
-                let axes = if ring(*id) {
-                    let (sin, cos) = angle(p).sin_cos();
-                    Matrix3::from_columns(&[
-                        Vector3::new(0.0, cos, sin),
-                        Vector3::new(0.0, -sin, cos),
-                        Vector3::x(),
-                    ])
-                } else {
-                    style.axes.transpose()
-                };
+                let axes = axes(*id, p);
                 let local = |v: Vector3<f64>| axes.transpose() * v;
                 // The ring nodes are those of solid elements.
                 let turn = if *id == GIMBAL { turn } else { Vector3::zeros() };
