@@ -334,7 +334,7 @@ fn numbers_of_cases_that_do_not_fit_are_refused_with_one_that_does() {
 #[test]
 fn sobol_dimensions_follow_the_rows_and_not_the_text_of_the_keys() {
     let first = dispersion("");
-    let more = "[[row]]\npath = \"booster.*.bearing.damping\"\nlevel = \"engine\"\n\
+    let more = "[[row]]\npath = \"booster.*.mass_flow\"\nlevel = \"engine\"\n\
         apply = \"scale\"\nsource = \"E\"\nlaw = { kind = \"uniform\", low = 0.9, high = 1.1 }\n";
     let second = dispersion(more);
     let scheme = Scheme::Sobol { replicates: 1 };
