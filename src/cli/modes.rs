@@ -80,6 +80,9 @@ pub fn run(args: &Args, out: &mut dyn Write) -> Result<u8, Error> {
     if !(0.5..=1.0).contains(&args.keep_overlap) {
         return Err(Error::Usage("--keep-overlap must be from 0.5 to 1".to_owned()));
     }
+    if !(args.max_hz > 0.0) {
+        return Err(Error::Usage("--max-hz must be above zero".to_owned()));
+    }
     let thresholds = Thresholds { keep: args.keep_overlap, ..Thresholds::default() };
     let times = if args.times.is_empty() { &model.flight_times_s } else { &args.times };
     let (modal, rigid) = structure::solve(&model, times, selection, &thresholds)
@@ -193,6 +196,8 @@ mod tests {
         assert_eq!(late.code(), crate::cli::USAGE);
         let words = ["modes", stick, "-o", "never", "--max-hz", "0.1"];
         assert!(run_line(&words).unwrap_err().to_string().contains("no elastic mode"));
+        let below = run_line(&["modes", stick, "-o", "never", "--max-hz=-3"]).unwrap_err();
+        assert!(below.to_string().contains("above zero"), "{below}");
         let none = run_line(&["modes", "no-such.toml", "-o", "never"]).unwrap_err();
         assert_eq!(none.code(), crate::cli::USAGE);
         assert!(!std::path::Path::new("never").exists());
