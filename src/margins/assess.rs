@@ -7,7 +7,7 @@
 use super::contour::{self, Curve, Error};
 use super::loops::{Sample, decibels, from_critical};
 use super::peak::{self, Peak};
-use super::search;
+use super::search::{self, Search};
 use super::{DELAY_CAP_S, DISTANCE_CAP, GAIN_CAP_DB, Settings};
 use nalgebra::{Complex, Matrix3};
 use std::f64::consts::{PI, TAU};
@@ -128,68 +128,109 @@ pub fn assess(
         poles.iter().filter(beyond).map(|pole| if pole.im == 0.0 { 1 } else { 2 }).sum();
     let unstable = open - curve.half_turns();
     let contour = curve.contour;
-    let mut at = |place: f64| {
-        let s = contour.at(place);
-        let sample = Sample::new(place, s, &g(&[s])[0]);
-        if sample.is_finite() { Ok(sample) } else { Err(Error::NonFinite(s)) }
-    };
-    let mut axes = [AxisMargins::none(); 3];
-    if unstable == 0 {
-        for (axis, margins) in axes.iter_mut().enumerate() {
-            *margins = margins_of(axis, &curve, settings, &mut at)?;
-        }
-    }
+    let mut at = |places: &[f64]| contour.samples(&mut g, places);
+    let axes =
+        if unstable == 0 { margins(&curve, settings, &mut at)? } else { [AxisMargins::none(); 3] };
     let peaks = peak::peaks(&curve, poles, unstable == 0, settings, &mut at)?;
     Ok(Assessment { axes, peaks, unstable, curve })
 }
 
-/// The margins of one axis of a stable closed loop.
-fn margins_of(
-    axis: usize,
+/// What is searched for in a loop.
+#[derive(Debug, Clone, Copy)]
+enum Sought {
+    /// |L| = 1.
+    GainCrossing,
+    /// The negative real axis.
+    PhaseCrossing,
+    /// The greatest radius of the disks.
+    Disk,
+    /// The least distance from the ellipse.
+    Ellipse,
+}
+
+impl Sought {
+    /// The function whose zero or maximum it is.
+    fn of(self, l: Complex<f64>, settings: &Settings) -> f64 {
+        match self {
+            Self::GainCrossing => l.norm_sqr().ln(),
+            Self::PhaseCrossing => from_critical(l),
+            Self::Disk => ((1.0 - l) / (1.0 + l)).norm(),
+            Self::Ellipse => -distance(l, settings),
+        }
+    }
+}
+
+/// The margins of the axes of a stable closed loop.
+fn margins(
     curve: &Curve,
     settings: &Settings,
-    at: &mut impl FnMut(f64) -> Result<Sample, Error>,
-) -> Result<AxisMargins, Error> {
-    let mut margins = AxisMargins::each(AxisMargins::CAPS.map(Margin::cap));
+    at: &mut impl FnMut(&[f64]) -> Result<Vec<Sample>, Error>,
+) -> Result<[AxisMargins; 3], Error> {
+    let mut margins = [AxisMargins::each(AxisMargins::CAPS.map(Margin::cap)); 3];
     let on_axis = curve.samples.partition_point(|sample| sample.place < 1.0);
-    // The limit of low frequency: a loop that ends on the negative real axis crosses −180° there. The
-    // real part at jε is nearer to the limit than the value at ε.
-    let end = curve.samples[on_axis].broken[axis].re;
-    let limit =
-        (curve.samples[0].broken[axis].re < 0.0 && end < 0.0).then_some(Complex::new(end, 0.0));
-    if let Some(limit) = limit {
-        margins.take_phase_crossing(limit, 0.0);
-    }
-    for pair in curve.samples[on_axis..].windows(2) {
-        let (a, b) = (&pair[0], &pair[1]);
-        let (la, lb) = (a.broken[axis], b.broken[axis]);
-        let between = [a.place, b.place];
-        if (la.norm() < 1.0) != (lb.norm() < 1.0) {
-            let ends = [la, lb].map(|l| l.norm_sqr().ln());
-            let place =
-                search::zero(between, ends, CROSSING, |t| Ok(at(t)?.broken[axis].norm_sqr().ln()))?;
-            let crossing = at(place)?;
-            margins.take_gain_crossing(crossing.broken[axis], crossing.omega_rad_s());
+    let samples = &curve.samples[on_axis..];
+    let (mut searches, mut sought) = (Vec::new(), Vec::new());
+    for (axis, margins) in margins.iter_mut().enumerate() {
+        // The limit of low frequency: a loop that ends on the negative real axis crosses −180° there. The
+        // real part at jε is nearer to the limit than the value at ε.
+        let end = samples[0].broken[axis].re;
+        if curve.samples[0].broken[axis].re < 0.0 && end < 0.0 {
+            let limit = Complex::new(end, 0.0);
+            margins.take_phase_crossing(limit, 0.0);
+            margins.disk.tighten(2.0 / Sought::Disk.of(limit, settings), 0.0);
+            margins.ellipse.tighten(distance(limit, settings), 0.0);
         }
-        if (la.im < 0.0) != (lb.im < 0.0) && la.re < 0.0 && lb.re < 0.0 {
-            let ends = [la, lb].map(from_critical);
-            let place =
-                search::zero(between, ends, CROSSING, |t| Ok(from_critical(at(t)?.broken[axis])))?;
-            let crossing = at(place)?;
-            margins.take_phase_crossing(crossing.broken[axis], crossing.omega_rad_s());
+        for pair in samples.windows(2) {
+            let [la, lb] = [pair[0].broken[axis], pair[1].broken[axis]];
+            let mut cross = |what: Sought| {
+                let ends = [la, lb].map(|l| what.of(l, settings));
+                searches.push(Search::zero([pair[0].place, pair[1].place], ends, CROSSING));
+                sought.push((axis, what));
+            };
+            if (la.norm() < 1.0) != (lb.norm() < 1.0) {
+                cross(Sought::GainCrossing);
+            }
+            if (la.im < 0.0) != (lb.im < 0.0) && la.re < 0.0 && lb.re < 0.0 {
+                cross(Sought::PhaseCrossing);
+            }
+        }
+        for what in [Sought::Disk, Sought::Ellipse] {
+            let values: Vec<f64> =
+                samples.iter().map(|sample| what.of(sample.broken[axis], settings)).collect();
+            for (value, sample) in values.iter().zip(samples) {
+                margins.take_extreme(what, *value, sample.omega_rad_s());
+            }
+            for index in maxima(&values) {
+                let bracket = [samples[index - 1].place, samples[index + 1].place];
+                let start = (samples[index].place, values[index]);
+                searches.push(Search::maximum(bracket, start, EXTREME));
+                sought.push((axis, what));
+            }
         }
     }
-    let disk = |l: Complex<f64>| ((1.0 - l) / (1.0 + l)).norm();
-    let (value, omega) = greatest(axis, &curve.samples[on_axis..], disk, at)?;
-    margins.disk.tighten(2.0 / value, omega);
-    let near = |l: Complex<f64>| -distance(l, settings);
-    let (value, omega) = greatest(axis, &curve.samples[on_axis..], near, at)?;
-    margins.ellipse.tighten(-value, omega);
-    if let Some(limit) = limit {
-        margins.disk.tighten(2.0 / disk(limit), 0.0);
-        margins.ellipse.tighten(distance(limit, settings), 0.0);
+    let found = search::run(&mut searches, at, |index, sample: &Sample| {
+        let (axis, what) = sought[index];
+        what.of(sample.broken[axis], settings)
+    })?;
+    for ((axis, what), sample) in sought.into_iter().zip(found) {
+        let (l, omega, margins) = (sample.broken[axis], sample.omega_rad_s(), &mut margins[axis]);
+        match what {
+            Sought::GainCrossing => margins.take_gain_crossing(l, omega),
+            Sought::PhaseCrossing => margins.take_phase_crossing(l, omega),
+            _ => margins.take_extreme(what, what.of(l, settings), omega),
+        }
     }
     Ok(margins)
+}
+
+/// The local maxima of values along a curve that can be its greatest.
+fn maxima(values: &[f64]) -> impl Iterator<Item = usize> + '_ {
+    let greatest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    (1..values.len().saturating_sub(1)).filter(move |&index| {
+        let [before, here, after] = [values[index - 1], values[index], values[index + 1]];
+        // Between samples a smooth maximum rises by no more than to its neighbours it falls.
+        before <= here && here >= after && here + (here - before).max(here - after) > greatest
+    })
 }
 
 /// Distance from −1 on the Nichols chart in units of the ellipse.
@@ -210,6 +251,13 @@ impl AxisMargins {
         }
     }
 
+    fn take_extreme(&mut self, what: Sought, value: f64, omega_rad_s: f64) {
+        match what {
+            Sought::Ellipse => self.ellipse.tighten(-value, omega_rad_s),
+            _ => self.disk.tighten(2.0 / value, omega_rad_s),
+        }
+    }
+
     fn take_gain_crossing(&mut self, l: Complex<f64>, omega_rad_s: f64) {
         let angle = from_critical(l);
         self.phase_deg.tighten(angle.abs().to_degrees(), omega_rad_s);
@@ -217,40 +265,6 @@ impl AxisMargins {
         let turn = if angle < 0.0 { angle + TAU } else { angle };
         self.delay_s.tighten(turn / omega_rad_s, omega_rad_s);
     }
-}
-
-/// The greatest value of `of` an axis' loop along the imaginary axis, and its frequency, rad/s: every
-/// local maximum of the samples that can be the greatest is searched.
-fn greatest(
-    axis: usize,
-    samples: &[Sample],
-    of: impl Fn(Complex<f64>) -> f64,
-    at: &mut impl FnMut(f64) -> Result<Sample, Error>,
-) -> Result<(f64, f64), Error> {
-    let values: Vec<f64> = samples.iter().map(|sample| of(sample.broken[axis])).collect();
-    let value = |index: usize| values[index];
-    let mut best = (f64::NEG_INFINITY, 0.0);
-    for (index, &here) in values.iter().enumerate() {
-        if here > best.0 {
-            best = (here, samples[index].omega_rad_s());
-        }
-    }
-    let sampled = best.0;
-    for index in 1..samples.len().saturating_sub(1) {
-        let here = value(index);
-        let rise = (here - value(index - 1)).max(here - value(index + 1));
-        // Between samples a smooth maximum rises by no more than to its neighbours it falls.
-        if value(index - 1) <= here && here >= value(index + 1) && here + rise > sampled {
-            let bracket = [samples[index - 1].place, samples[index + 1].place];
-            let start = (samples[index].place, here);
-            let (place, value) =
-                search::maximum(bracket, start, EXTREME, |t| Ok(of(at(t)?.broken[axis])))?;
-            if value > best.0 {
-                best = (value, at(place)?.omega_rad_s());
-            }
-        }
-    }
-    Ok(best)
 }
 
 /// Whether an angle is at least `margin` away from −180°, degrees.

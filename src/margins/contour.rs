@@ -146,7 +146,10 @@ pub fn scan(
 
 impl Contour {
     /// The loops at several places.
-    fn samples(
+    ///
+    /// # Errors
+    /// A loop that is not finite.
+    pub(super) fn samples(
         &self,
         g: &mut impl FnMut(&[Complex<f64>]) -> Vec<Matrix3<Complex<f64>>>,
         places: &[f64],

@@ -6,7 +6,7 @@ use super::Settings;
 use super::assess::{CROSSING, EXTREME, is_away};
 use super::contour::{Curve, Error};
 use super::loops::{Sample, decibels, from_critical};
-use super::search;
+use super::search::{self, Search};
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 
@@ -60,16 +60,26 @@ pub struct Peak {
     pub stabilised: Stabilised,
 }
 
-/// The peaks of every lightly damped pole beyond the contour's arc, in each axis.
+/// The highest point of a loop about a pole: a sample, then what was found between samples.
+struct Top {
+    pole: Complex<f64>,
+    axis: usize,
+    index: usize,
+    highest: Sample,
+}
+
+/// The peaks of every lightly damped pole beyond the contour's arc, in each axis; none where the window is
+/// beyond the curve.
 pub(super) fn peaks(
     curve: &Curve,
     poles: &[Complex<f64>],
     stable: bool,
     settings: &Settings,
-    at: &mut impl FnMut(f64) -> Result<Sample, Error>,
+    at: &mut impl FnMut(&[f64]) -> Result<Vec<Sample>, Error>,
 ) -> Result<Vec<Peak>, Error> {
     let radius = curve.contour.radius_rad_s;
-    let mut peaks = Vec::new();
+    let samples = &curve.samples;
+    let (mut tops, mut searches, mut searched) = (Vec::new(), Vec::new(), Vec::new());
     for &pole in poles {
         let light = pole.im > radius && pole.re.abs() <= settings.light_damping_ratio * pole.norm();
         if !light {
@@ -78,90 +88,97 @@ pub(super) fn peaks(
         let half = WINDOW * pole.re.abs();
         let lowest = (pole.im - half).max(radius);
         let place = |omega: f64| curve.contour.place(omega);
-        let from = curve.samples.partition_point(|sample| sample.place < place(lowest));
-        let to = curve.samples.partition_point(|sample| sample.place <= place(pole.im + half));
+        let from = samples.partition_point(|sample| sample.place < place(lowest));
+        let to = samples.partition_point(|sample| sample.place <= place(pole.im + half));
         for axis in 0..3 {
-            peaks.extend(peak(curve, from..to, pole, axis, stable, settings, at)?);
+            let size = |index: usize| samples[index].broken[axis].norm_sqr();
+            let Some(index) = (from..to).max_by(|&a, &b| size(a).total_cmp(&size(b))) else {
+                continue;
+            };
+            let highest = samples[index];
+            let value = decibels(highest.broken[axis]);
+            if index > from && index + 1 < to && value > SEARCHED_DB {
+                let bracket = [samples[index - 1].place, samples[index + 1].place];
+                searches.push(Search::maximum(bracket, (highest.place, value), EXTREME));
+                searched.push(tops.len());
+            }
+            tops.push(Top { pole, axis, index, highest });
         }
     }
-    Ok(peaks)
-}
-
-/// The peak of one axis among the samples of a window; none where the window is beyond the curve.
-fn peak(
-    curve: &Curve,
-    window: std::ops::Range<usize>,
-    pole: Complex<f64>,
-    axis: usize,
-    stable: bool,
-    settings: &Settings,
-    at: &mut impl FnMut(f64) -> Result<Sample, Error>,
-) -> Result<Option<Peak>, Error> {
-    let size = |index: usize| curve.samples[index].broken[axis].norm_sqr();
-    let Some(top) = window.clone().max_by(|&a, &b| size(a).total_cmp(&size(b))) else {
-        return Ok(None);
-    };
-    let mut highest = curve.samples[top];
-    let inside = top > window.start && top + 1 < window.end;
-    if inside && decibels(highest.broken[axis]) > SEARCHED_DB {
-        let bracket = [curve.samples[top - 1].place, curve.samples[top + 1].place];
-        let start = (highest.place, decibels(highest.broken[axis]));
-        let (place, _) =
-            search::maximum(bracket, start, EXTREME, |t| Ok(decibels(at(t)?.broken[axis])))?;
-        highest = at(place)?;
+    let found = search::run(&mut searches, &mut *at, |search, sample: &Sample| {
+        decibels(sample.broken[tops[searched[search]].axis])
+    })?;
+    for (top, sample) in searched.into_iter().zip(found) {
+        tops[top].highest = sample;
     }
-    let l = highest.broken[axis];
-    let stabilised = if decibels(l) < -settings.gain_margin_db {
-        Stabilised::Gain
-    } else if stable && keeps_away(&curve.samples, top, axis, settings, at)? {
-        Stabilised::Phase
-    } else {
-        Stabilised::Neither
-    };
-    Ok(Some(Peak {
-        pole,
-        axis,
-        peak_db: decibels(l),
-        omega_rad_s: highest.omega_rad_s(),
-        from_critical_deg: from_critical(l).to_degrees(),
-        stabilised,
-    }))
+    let keep_away = if stable { keep_away(samples, &tops, settings, at)? } else { Vec::new() };
+    let peaks = tops.iter().enumerate().map(|(number, top)| {
+        let l = top.highest.broken[top.axis];
+        let stabilised = if decibels(l) < -settings.gain_margin_db {
+            Stabilised::Gain
+        } else if keep_away.get(number).copied().unwrap_or(false) {
+            Stabilised::Phase
+        } else {
+            Stabilised::Neither
+        };
+        Peak {
+            pole: top.pole,
+            axis: top.axis,
+            peak_db: decibels(l),
+            omega_rad_s: top.highest.omega_rad_s(),
+            from_critical_deg: from_critical(l).to_degrees(),
+            stabilised,
+        }
+    });
+    Ok(peaks.collect())
 }
 
-/// Whether a loop keeps its phase margin in the lobe around the sample `top`: at the samples whose gain
-/// is within the gain margin of 0 dB, and where it enters and leaves that band between them.
-fn keeps_away(
+/// Per top above minus the gain margin, whether its loop keeps its phase margin in the lobe around it: at the
+/// samples whose gain is within the gain margin of 0 dB, and where it enters and leaves that band between them.
+fn keep_away(
     samples: &[Sample],
-    top: usize,
-    axis: usize,
+    tops: &[Top],
     settings: &Settings,
-    at: &mut impl FnMut(f64) -> Result<Sample, Error>,
-) -> Result<bool, Error> {
-    let gain = |sample: &Sample| decibels(sample.broken[axis]);
+    at: &mut impl FnMut(&[f64]) -> Result<Vec<Sample>, Error>,
+) -> Result<Vec<bool>, Error> {
     let most = settings.gain_margin_db;
-    let safe = |sample: &Sample| {
-        gain(sample).abs() > most || is_away(sample.broken[axis], settings.phase_margin_deg)
-    };
-    let up = samples[top..].iter().take_while(|sample| gain(sample) >= -most).count();
-    let down = samples[..top].iter().rev().take_while(|sample| gain(sample) >= -most).count();
-    // With the neighbours outside, where there are any.
-    let lobe = &samples[(top - down).saturating_sub(1)..(top + up + 1).min(samples.len())];
-    if !lobe.iter().all(safe) {
-        return Ok(false);
-    }
-    for pair in lobe.windows(2).filter(|pair| pair[0].place >= 1.0) {
-        for level in [-most, most] {
-            let ends = [gain(&pair[0]) - level, gain(&pair[1]) - level];
-            if (ends[0] < 0.0) != (ends[1] < 0.0) {
-                let between = [pair[0].place, pair[1].place];
-                let place = search::zero(between, ends, CROSSING, |t| Ok(gain(&at(t)?) - level))?;
-                if !is_away(at(place)?.broken[axis], settings.phase_margin_deg) {
-                    return Ok(false);
+    let away =
+        |sample: &Sample, axis: usize| is_away(sample.broken[axis], settings.phase_margin_deg);
+    let (mut searches, mut sought) = (Vec::new(), Vec::new());
+    let mut keep_away = vec![false; tops.len()];
+    for (number, &Top { axis, index: top, highest, .. }) in tops.iter().enumerate() {
+        let gain = |sample: &Sample| decibels(sample.broken[axis]);
+        if gain(&highest) < -most {
+            continue;
+        }
+        let up = samples[top..].iter().take_while(|sample| gain(sample) >= -most).count();
+        let down = samples[..top].iter().rev().take_while(|sample| gain(sample) >= -most).count();
+        // With the neighbours outside, where there are any.
+        let lobe = &samples[(top - down).saturating_sub(1)..(top + up + 1).min(samples.len())];
+        keep_away[number] =
+            lobe.iter().all(|sample| gain(sample).abs() > most || away(sample, axis));
+        if !keep_away[number] {
+            continue;
+        }
+        for pair in lobe.windows(2).filter(|pair| pair[0].place >= 1.0) {
+            for level in [-most, most] {
+                let ends = [gain(&pair[0]) - level, gain(&pair[1]) - level];
+                if (ends[0] < 0.0) != (ends[1] < 0.0) {
+                    let between = [pair[0].place, pair[1].place];
+                    searches.push(Search::zero(between, ends, CROSSING));
+                    sought.push((number, axis, level));
                 }
             }
         }
     }
-    Ok(true)
+    let found = search::run(&mut searches, at, |search, sample: &Sample| {
+        let (_, axis, level) = sought[search];
+        decibels(sample.broken[axis]) - level
+    })?;
+    for ((number, axis, _), sample) in sought.into_iter().zip(found) {
+        keep_away[number] &= away(&sample, axis);
+    }
+    Ok(keep_away)
 }
 
 #[cfg(test)]
