@@ -54,6 +54,7 @@ impl Law {
                 let command = law.command.as_ref().map_or(0, |command| command.poles_at_origin());
                 command + law.stiffness.poles_at_origin()
             }
+            Self::StateSpace(law) if law.system.a.is_empty() => 0,
             // Of given matrices the rank tells.
             Self::StateSpace(law) => {
                 let a = &law.system.a;
