@@ -91,7 +91,7 @@ impl Zero {
     fn ask(&self) -> Option<f64> {
         let at_end = self.fa == 0.0 || self.fb == 0.0;
         let narrow = !((self.b - self.a).abs() > self.tolerance);
-        (!at_end && !narrow).then(|| self.a + self.fraction * (self.b - self.a))
+        (!at_end && !narrow).then_some(self.a + self.fraction * (self.b - self.a))
     }
 
     fn tell(&mut self, fx: f64) {
