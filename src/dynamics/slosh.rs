@@ -67,7 +67,11 @@ impl TankAttachment {
             }
         }
         columns.add_rotation_stiffness(&displacement, mass, acceleration, self.in_modes, model);
+        for motion in [&displacement, &self.slope] {
+            model.interface.add_motion(&motion[columns.rigid..columns.body]);
+        }
     }
+
     /// The part of the slosh mass in the form of [`super::gradient`], and its gradient with the mean
     /// acceleration held.
     pub fn form(

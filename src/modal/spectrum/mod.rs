@@ -5,9 +5,11 @@
 //! the dense solver, `eigen`.
 
 mod elimination;
+mod gram;
 pub mod lanes;
 mod pencil;
 mod predict;
+mod reduction;
 mod scaled;
 mod secular;
 
@@ -16,13 +18,14 @@ pub use secular::{Bounded, Uncertain};
 
 use self::lanes::{Complexes, Level, WIDTH};
 use self::pencil::Pencil;
+use self::reduction::Reduction;
 use self::secular::Secular;
 use super::{Solver, eigen};
 use crate::dynamics::Model;
 use faer::c64;
 
-/// Second-order coordinates beyond which elimination at every pole costs more than a dense solve.
-const MOST_COORDINATES: usize = 64;
+/// Second-order coordinates beyond which elimination of whole matrices at every pole costs more than a dense solve.
+const MOST_COORDINATES: f64 = 64.0;
 /// Rounds of evaluations before a spectrum is given up.
 const MOST_ROUNDS: usize = 6;
 
@@ -50,31 +53,34 @@ impl Base {
     /// The base of `model`, where determinants pay and certify the model itself: a model too large, or whose poles
     /// are too sensitive for discs, would only cost determinants before the dense solver answers.
     pub fn proven(model: &Model, solver: &mut Solver) -> Option<Self> {
-        let size = model.coordinates();
-        let base = (model.second_order <= MOST_COORDINATES)
-            .then(|| Self::of(model, solver).ok())
-            .flatten()?;
-        Spectrum::new(size).solve(&base, model).is_ok().then_some(base)
+        let mut reduction = Reduction::default();
+        reduction.set(model);
+        // Determinants cost as many times their own effort as there are poles, the dense solve the cube of the poles.
+        let effort = if reduction.count > 0 { reduction.effort() } else { (model.second_order as f64).powi(3) };
+        let worth = effort <= MOST_COORDINATES * (model.second_order as f64).powi(2);
+        let base = worth.then(|| Self::of(model, solver).ok()).flatten()?;
+        Spectrum::new().solve(&base, model).is_ok().then_some(base)
     }
 }
 
 impl Spectrum {
-    /// Buffers for models of `size` coordinates.
-    pub fn new(size: usize) -> Self {
-        Self::with(size, Level::best())
+    /// Buffers.
+    pub fn new() -> Self {
+        Self::with(Level::best())
     }
 
-    /// Buffers for models of `size` coordinates, with this instruction set.
-    pub fn with(size: usize, level: Level) -> Self {
+    /// Buffers, with this instruction set.
+    pub fn with(level: Level) -> Self {
         Self {
             level,
-            pencil: Pencil::new(size),
+            pencil: Pencil::new(),
             secular: Secular::default(),
             guesses: Vec::new(),
             evaluations: 0,
         }
     }
 
+    pub fn reduced(&self) -> [usize; 3] { let r = self.pencil.reduction(); [r.elastic.len(), r.count, r.others.len()] }
     /// Determinants evaluated for the last model.
     pub fn evaluations(&self) -> usize {
         self.evaluations
@@ -93,13 +99,14 @@ impl Spectrum {
         if !self.pencil.set(model) {
             return Err(Uncertain::NonFinite);
         }
-        base.predict(self.level, model, &mut self.guesses);
+        base.predict(self.level, model, self.pencil.reduction(), &mut self.guesses);
         if !self.guesses.iter().all(|s| s.re.is_finite() && s.im.is_finite()) {
             return Err(Uncertain::NonFinite);
         }
         let logarithms: f64 = self.guesses.iter().map(|s| s.norm().ln()).sum();
         let typical = (logarithms / self.guesses.len() as f64).exp();
         self.pencil.equilibrate(if typical > 0.0 { typical } else { 1.0 });
+        self.pencil.lead_reduced(self.level);
         self.secular.start(self.guesses.iter().copied());
         // Idle lanes of the first round, at least one, look beside the poles expected.
         let count = self.guesses.len();

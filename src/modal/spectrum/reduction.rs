@@ -1,0 +1,314 @@
+//! From a model to its interface: elastic coordinates with equations of their own, seen by the rest through a few
+//! motions.
+//!
+//! With the elastic block `diag(e) + Bᵀ Z B` and its coupling `Bᵀ a` and `β B` to the other coordinates, what the
+//! elastic coordinates do to the rest passes through `G = B diag(e)⁻¹ Bᵀ`; determinants of what is left are those of
+//! `pencil`. Which motions B there may be says `dynamics::Interface`; which of them are independent, and Z, a and β, are
+//! found in the matrices of the model themselves, and a product with a vector of signs proves that nothing is left out.
+
+use crate::dynamics::Model;
+use faer::Mat;
+use nalgebra::DMatrix;
+use std::ops::Range;
+
+/// What is left of a motion, in parts of its largest element, that is of the others.
+const DEPENDENT: f64 = 1e-12;
+/// An element of Z, in parts of the geometric mean of its diagonal elements, that is rounding; or of a and β, in parts of
+/// the terms of which it is the sum.
+const NEGLIGIBLE: f64 = 1e-14;
+/// Largest part of the terms of a product that may be left out: rounding of the terms.
+const LEFT_OUT: f64 = 1e-12;
+
+/// The interface of one model.
+#[derive(Debug, Default)]
+pub struct Reduction {
+    /// The elastic coordinates that are reduced; none where there is no interface worth it.
+    pub elastic: Range<usize>,
+    /// The other coordinates, ascending.
+    pub others: Vec<usize>,
+    /// Number of motions.
+    pub count: usize,
+    /// Mass, damping and stiffness of each elastic coordinate by itself.
+    pub own: Vec<[f64; 3]>,
+    /// The motions B: a row of `count` per elastic coordinate.
+    pub motions: Vec<f64>,
+    /// Mass, damping and stiffness `[[Z, a], [β, L]]` over the motions, then the other coordinates, row by row.
+    pub entries: Vec<[f64; 3]>,
+    /// Rows that may be motions; then what elimination leaves of them.
+    candidates: Vec<f64>,
+    left: Vec<f64>,
+    /// Row and column of each pivot.
+    pivots: Vec<[usize; 2]>,
+}
+
+/// Operations per frequency, over 8/3: the cube of the size of a whole matrix that would cost as much.
+fn effort(modes: usize, motions: usize, others: usize) -> f64 {
+    let [k, c, o] = [modes, motions, others].map(|count| count as f64);
+    let size = c + o;
+    size.powi(3) + 0.375 * (2.0 * k * c * c + 16.0 * k * c + 8.0 * c * size * size.min(10.0))
+}
+
+impl Reduction {
+    /// Operations of a determinant, over 8/3.
+    pub fn effort(&self) -> f64 {
+        effort(self.elastic.len(), self.count, self.others.len())
+    }
+
+    /// Takes a model: its interface, or no elastic coordinates where there is none, or none that pays.
+    pub fn set(&mut self, model: &Model) {
+        let size = model.coordinates();
+        self.elastic = model.interface.elastic.clone();
+        if self.elastic.is_empty() || !self.find(model) {
+            self.elastic = 0..0;
+            self.count = 0;
+            self.others.clear();
+            self.others.extend(0..size);
+        }
+    }
+
+    fn find(&mut self, model: &Model) -> bool {
+        let known = &model.interface;
+        if known.full.iter().any(|full| !full.is_empty()) {
+            return false;
+        }
+        let size = model.coordinates();
+        let elastic = self.elastic.clone();
+        self.others.clear();
+        self.others.extend((0..size).filter(|at| !elastic.contains(at)));
+        let whole = (size as f64).powi(3);
+        self.gather(model);
+        let worth = |count: usize| {
+            effort(elastic.len(), count, size - elastic.len()) < 0.8 * whole
+        };
+        if !self.pivot(elastic.len(), worth) {
+            return false;
+        }
+        self.own.clear();
+        self.own.extend(&known.own);
+        self.reduce(model) && self.complete(model)
+    }
+
+    /// Rows that may be motions: those known, and what other coordinates see that are not attached to the body.
+    fn gather(&mut self, model: &Model) {
+        let known = &model.interface;
+        let (count, n) = (self.elastic.len(), model.second_order);
+        self.candidates.clear();
+        let rows = known.motions.chunks_exact(count).filter(|row| row.iter().any(|v| *v != 0.0));
+        rows.for_each(|row| self.candidates.extend(row));
+        let apart = self.others.iter().filter(|at| **at < self.elastic.start || **at >= n);
+        let matrices = [&model.mass, &model.damping, &model.stiffness];
+        for &at in apart {
+            for matrix in matrices {
+                let row = self.elastic.clone().map(|mode| matrix[(at, mode)]);
+                if row.clone().any(|value| value != 0.0) {
+                    self.candidates.extend(row);
+                }
+                let column = &matrix.col_as_slice(at)[self.elastic.clone()];
+                if column.iter().any(|value| *value != 0.0) {
+                    self.candidates.extend(column);
+                }
+            }
+        }
+    }
+
+    /// Picks independent rows of the candidates, and an elastic coordinate for each: Gaussian elimination with complete
+    /// pivoting of rows scaled alike. False as soon as there are too many.
+    fn pivot(&mut self, modes: usize, worth: impl Fn(usize) -> bool) -> bool {
+        self.left.clear();
+        self.left.extend(&self.candidates);
+        self.pivots.clear();
+        let rows = self.left.len() / modes;
+        // Largest element left of each row, and its place.
+        let mut most = Vec::with_capacity(rows);
+        for row in self.left.chunks_exact_mut(modes) {
+            let largest = largest(row).1.recip();
+            row.iter_mut().for_each(|value| *value *= largest);
+            most.push(self::largest(row));
+        }
+        let mut open: Vec<usize> = (0..rows).collect();
+        let mut pivot_row = vec![0.0; modes];
+        while let Some((at, &row)) =
+            open.iter().enumerate().max_by(|(_, a), (_, b)| most[**a].1.total_cmp(&most[**b].1))
+        {
+            let (column, size) = most[row];
+            if !(size > DEPENDENT) {
+                break;
+            }
+            if !worth(self.pivots.len() + 1) {
+                return false;
+            }
+            open.remove(at);
+            self.pivots.push([row, column]);
+            pivot_row.copy_from_slice(&self.left[row * modes..][..modes]);
+            for &other in &open {
+                let values = &mut self.left[other * modes..][..modes];
+                let factor = values[column] / pivot_row[column];
+                if factor == 0.0 {
+                    continue;
+                }
+                for (value, pivot) in values.iter_mut().zip(&pivot_row) {
+                    *value -= factor * pivot;
+                }
+                values[column] = 0.0;
+                most[other] = largest(values);
+            }
+        }
+        self.pivots.sort_unstable();
+        self.count = self.pivots.len();
+        self.count > 0
+    }
+
+    /// B, and Z, a and β by the elements of the model at the pivots.
+    fn reduce(&mut self, model: &Model) -> bool {
+        let (modes, c, first) = (self.elastic.len(), self.count, self.elastic.start);
+        let size = c + self.others.len();
+        let rows: Vec<usize> = self.pivots.iter().map(|[row, _]| *row).collect();
+        let columns: Vec<usize> = self.pivots.iter().map(|[_, column]| *column).collect();
+        self.motions.clear();
+        for mode in 0..modes {
+            self.motions.extend(rows.iter().map(|row| self.candidates[row * modes + mode]));
+        }
+        let at_pivots = DMatrix::from_fn(c, c, |i, j| self.candidates[rows[i] * modes + columns[j]]);
+        let Some(inverse) = at_pivots.try_inverse() else { return false };
+        self.entries.clear();
+        self.entries.resize(size * size, [0.0; 3]);
+        let matrices = [&model.mass, &model.damping, &model.stiffness];
+        for (kind, matrix) in matrices.into_iter().enumerate() {
+            let element = |i: usize, j: usize| match i == j {
+                true => model.interface.attached[columns[i]][kind],
+                false => matrix[(first + columns[i], first + columns[j])],
+            };
+            let between = DMatrix::from_fn(c, c, element);
+            if between.iter().any(|value| *value != 0.0) {
+                let between = inverse.tr_mul(&between) * &inverse;
+                for (index, value) in between.iter().enumerate() {
+                    self.entries[index % c * size + index / c][kind] = *value;
+                }
+            }
+            for (j, &other) in self.others.iter().enumerate() {
+                let row: Vec<f64> =
+                    columns.iter().map(|column| matrix[(other, first + column)]).collect();
+                let column: Vec<f64> =
+                    columns.iter().map(|column| matrix[(first + column, other)]).collect();
+                for i in 0..c {
+                    self.entries[i * size + c + j][kind] = through(inverse.column(i).iter(), &column);
+                    self.entries[(c + j) * size + i][kind] = through(inverse.column(i).iter(), &row);
+                }
+                for (i, &to) in self.others.iter().enumerate() {
+                    self.entries[(c + i) * size + c + j][kind] = matrix[(to, other)];
+                }
+            }
+        }
+        self.neglect();
+        self.entries.iter().flatten().all(|value| value.is_finite())
+    }
+
+    /// Makes elements of Z that are rounding exact zeros, so that they cost nothing.
+    fn neglect(&mut self) {
+        let (c, size) = (self.count, self.count + self.others.len());
+        // Frequency at which sizes are compared: the geometric mean of the elastic coordinates'.
+        let logarithms: f64 = self.own.iter().map(|own| own[2].ln()).sum();
+        let square = (logarithms / self.own.len() as f64).exp();
+        let powers = [square, square.sqrt(), 1.0];
+        let modulus = |entry: &[f64; 3]| -> f64 {
+            entry.iter().zip(powers).map(|(value, power)| value.abs() * power).sum()
+        };
+        let diagonal: Vec<f64> =
+            (0..c).map(|i| modulus(&self.entries[i * size + i]).sqrt()).collect();
+        for i in 0..c {
+            for j in 0..c {
+                let entry = &mut self.entries[i * size + j];
+                let least = NEGLIGIBLE * diagonal[i] * diagonal[j];
+                if i != j && modulus(entry) <= least {
+                    *entry = [0.0; 3];
+                }
+            }
+        }
+    }
+
+    /// Whether the reduced form is the model: rows and columns times a vector of signs on the elastic coordinates.
+    fn complete(&self, model: &Model) -> bool {
+        let (c, first) = (self.count, self.elastic.start);
+        let size = c + self.others.len();
+        let sign = |at: usize| if (at * at + at / 3) % 5 < 2 { -1.0 } else { 1.0 };
+        // What the motions see of the signs, and could see at most.
+        let mut seen = vec![[0.0; 2]; c];
+        for (mode, row) in self.motions.chunks_exact(c.max(1)).enumerate() {
+            for (seen, motion) in seen.iter_mut().zip(row) {
+                seen[0] += motion * sign(first + mode);
+                seen[1] += motion.abs();
+            }
+        }
+        let agree = |value: f64, [sum, size]: [f64; 2]| (value - sum).abs() <= LEFT_OUT * size;
+        let matrices = [&model.mass, &model.damping, &model.stiffness];
+        matrices.into_iter().enumerate().all(|(kind, matrix)| {
+            [false, true].into_iter().all(|transposed| {
+                let entry = |i: usize, j: usize| match transposed {
+                    false => self.entries[i * size + j][kind],
+                    true => self.entries[j * size + i][kind],
+                };
+                // Forces on a row of the reduced form: the sum, and the sum of moduli.
+                let force = |i: usize| {
+                    (0..c).fold([0.0; 2], |[sum, most], j| {
+                        let entry = entry(i, j);
+                        [sum + entry * seen[j][0], most + entry.abs() * seen[j][1]]
+                    })
+                };
+                let forces: Vec<[f64; 2]> = (0..c).map(force).collect();
+                let product = times_signs(matrix, transposed, &self.elastic, sign);
+                let elastic = (0..self.elastic.len()).all(|mode| {
+                    let own = model.interface.own[mode][kind];
+                    let row = &self.motions[mode * c..][..c];
+                    let start = [own * sign(first + mode), own.abs()];
+                    let expected = row.iter().zip(&forces).fold(start, |[sum, most], (b, f)| {
+                        [sum + b * f[0], most + b.abs() * f[1]]
+                    });
+                    agree(product[first + mode], expected)
+                });
+                elastic
+                    && self.others.iter().enumerate().all(|(place, &other)| {
+                        agree(product[other], force(c + place))
+                    })
+            })
+        })
+    }
+}
+
+/// A sum of products, zero where it is but rounding.
+fn through<'a>(factors: impl IntoIterator<Item = &'a f64>, values: &[f64]) -> f64 {
+    let (mut sum, mut size) = (0.0_f64, 0.0);
+    for (factor, value) in factors.into_iter().zip(values) {
+        sum += factor * value;
+        size += (factor * value).abs();
+    }
+    if sum.abs() > NEGLIGIBLE * size { sum } else { 0.0 }
+}
+
+/// Place and modulus of the largest element.
+fn largest(row: &[f64]) -> (usize, f64) {
+    let most = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    (row.iter().position(|value| value.abs() == most).unwrap_or(0), most)
+}
+
+/// A matrix, or its transpose, times signs in `range` and zeros elsewhere.
+fn times_signs(
+    matrix: &Mat<f64>,
+    transposed: bool,
+    range: &Range<usize>,
+    sign: impl Fn(usize) -> f64,
+) -> Vec<f64> {
+    let signs: Vec<f64> = range.clone().map(sign).collect();
+    if transposed {
+        let product = |column: usize| {
+            let values = &matrix.col_as_slice(column)[range.clone()];
+            values.iter().zip(&signs).map(|(value, sign)| value * sign).sum()
+        };
+        return (0..matrix.ncols()).map(product).collect();
+    }
+    let mut product = vec![0.0; matrix.nrows()];
+    for (column, sign) in range.clone().zip(signs) {
+        let values = matrix.col_as_slice(column);
+        product.iter_mut().zip(values).for_each(|(sum, value)| *sum += sign * value);
+    }
+    product
+}
