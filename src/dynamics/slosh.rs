@@ -67,8 +67,9 @@ impl TankAttachment {
             }
         }
         columns.add_rotation_stiffness(&displacement, mass, acceleration, self.in_modes, model);
-        for motion in [&displacement, &self.slope] {
-            model.interface.add_motion(&motion[columns.rigid..columns.body]);
+        model.interface.add_motion(&displacement[columns.rigid..columns.body]);
+        if columns.rigid > 0 {
+            model.interface.add_motion(&self.slope[columns.rigid..columns.body]);
         }
     }
 

@@ -353,7 +353,7 @@ impl Elimination {
             }
             let size = |i: &usize| {
                 let value = &self.column[*i];
-                value.re[lane].hypot(value.im[lane])
+                value.re[lane] * value.re[lane] + value.im[lane] * value.im[lane]
             };
             let best = (j..n).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(j);
             if best == j {

@@ -3,26 +3,21 @@
 //! Where the motions come from is decided in `reduction`, what is done with G in `pencil`.
 
 use super::lanes::{Complex, Complexes, Vector, WIDTH};
-use super::reduction::Reduction;
+use super::reduction::{BLOCK, Reduction};
 use super::scaled::Product;
 
-/// Rows and columns of G that are summed at once.
+/// Rows of a block of G that is summed at once.
 const ROWS: usize = 2;
-const COLUMNS: usize = 4;
 /// Roundings of e: three terms and their sum.
 const ROUNDINGS: f64 = 4.0;
 
 /// G and what it is made of.
 #[derive(Debug, Default)]
 pub struct Gram {
-    /// Number of motions, rounded up to whole blocks.
-    pub stride: usize,
-    /// The motions, a padded row per elastic coordinate.
-    motions: Vec<f64>,
-    /// Coefficients of each e.
-    own: Vec<[f64; 3]>,
-    /// 1/e.
+    stride: usize,
+    /// 1/e, and moduli.
     weights: Vec<Complexes>,
+    moduli: Vec<[f64; WIDTH]>,
     /// What rounding may have done to each e, in units of the unit roundoff.
     doubt: Vec<[f64; WIDTH]>,
     /// G, row by row.
@@ -32,29 +27,29 @@ pub struct Gram {
 }
 
 impl Gram {
-    /// Takes the motions and own equations of a model.
-    pub fn set(&mut self, reduction: &Reduction) {
-        let count = reduction.count;
-        self.stride = count.next_multiple_of(COLUMNS);
-        self.own.clone_from(&reduction.own);
-        self.motions.clear();
-        for row in reduction.motions.chunks_exact(count.max(1)) {
-            self.motions.extend(row);
-            self.motions.resize(self.motions.len() + self.stride - count, 0.0);
-        }
-        self.weights.resize(self.own.len(), Complexes::ZERO);
-        self.doubt.resize(self.own.len(), [0.0; WIDTH]);
-        self.elements.resize(self.stride * self.stride, Complexes::ZERO);
-        self.sizes.resize(self.stride, [0.0; WIDTH]);
+    /// Makes room for the motions and elastic coordinates of a model.
+    pub fn resize(&mut self, reduction: &Reduction) {
+        let (modes, stride) = (reduction.own.len(), reduction.stride);
+        self.stride = stride;
+        self.weights.resize(modes, Complexes::ZERO);
+        self.moduli.resize(modes, [0.0; WIDTH]);
+        self.doubt.resize(modes, [0.0; WIDTH]);
+        self.elements.resize(stride * stride, Complexes::ZERO);
+        self.sizes.resize(stride, [0.0; WIDTH]);
     }
 
     /// Forms G at frequencies with these powers s², s and 1 and their moduli; the product of all e.
     #[inline(always)]
-    pub fn form<V: Vector>(&mut self, powers: [Complex<V>; 3], moduli: [V; 3]) -> Product<V> {
+    pub fn form<V: Vector>(
+        &mut self,
+        reduction: &Reduction,
+        powers: [Complex<V>; 3],
+        moduli: [V; 3],
+    ) -> Product<V> {
         let mut product = Product::new();
         let floor = V::splat(f64::EPSILON);
-        for ((own, weight), doubt) in self.own.iter().zip(&mut self.weights).zip(&mut self.doubt) {
-            let [m, d, k] = own.map(V::splat);
+        for (mode, own) in reduction.own.iter().enumerate() {
+            let (m, d, k) = (V::splat(own[0]), V::splat(own[1]), V::splat(own[2]));
             let value = powers[2].scale(k).add_real_product(d, powers[1]);
             let value = value.add_real_product(m, powers[0]);
             let size = m.abs().mul_add(moduli[0], d.abs().mul_add(moduli[1], k.abs().mul(moduli[2])));
@@ -63,30 +58,34 @@ impl Gram {
             let square = value.square();
             let value = Complex::where_greater(square, least.re.mul(least.re), value, least);
             product.times(value);
-            value.reciprocal().store(weight);
-            size.mul(V::splat(ROUNDINGS)).store(doubt);
+            let inverse = V::splat(1.0).div(value.square());
+            let minus = V::splat(0.0).sub(inverse);
+            let weight = Complex { re: value.re.mul(inverse), im: value.im.mul(minus) };
+            weight.store(&mut self.weights[mode]);
+            inverse.sqrt().store(&mut self.moduli[mode]);
+            size.mul(V::splat(ROUNDINGS)).store(&mut self.doubt[mode]);
         }
-        self.measure::<V>();
+        self.measure::<V>(&reduction.motions);
         for row in (0..self.stride).step_by(ROWS) {
-            for column in (row / COLUMNS * COLUMNS..self.stride).step_by(COLUMNS) {
-                self.block::<V>(row, column);
+            for column in (row / BLOCK * BLOCK..self.stride).step_by(BLOCK) {
+                self.block::<V>(&reduction.motions, row, column);
             }
         }
         product
     }
 
     #[inline(always)]
-    fn measure<V: Vector>(&mut self) {
-        for first in (0..self.stride).step_by(COLUMNS) {
-            let mut sums = [V::splat(0.0); COLUMNS];
-            for (row, weight) in self.motions.chunks_exact(self.stride).zip(&self.weights) {
-                let size = Complex::<V>::load(weight).square().sqrt();
-                for i in 0..COLUMNS {
+    fn measure<V: Vector>(&mut self, motions: &[f64]) {
+        for first in (0..self.stride).step_by(BLOCK) {
+            let mut sums = [V::splat(0.0); BLOCK];
+            for (row, size) in motions.chunks_exact(self.stride).zip(&self.moduli) {
+                let size = V::load(size);
+                for i in 0..BLOCK {
                     let motion = row[first + i];
                     sums[i] = V::splat(motion * motion).mul_add(size, sums[i]);
                 }
             }
-            for i in 0..COLUMNS {
+            for i in 0..BLOCK {
                 sums[i].store(&mut self.sizes[first + i]);
             }
         }
@@ -94,21 +93,21 @@ impl Gram {
 
     /// A block of G and its mirror image.
     #[inline(always)]
-    fn block<V: Vector>(&mut self, row: usize, column: usize) {
-        let mut sums = [[Complex::<V>::splat(0.0, 0.0); COLUMNS]; ROWS];
-        for (motions, weight) in self.motions.chunks_exact(self.stride).zip(&self.weights) {
+    fn block<V: Vector>(&mut self, motions: &[f64], row: usize, column: usize) {
+        let mut sums = [[Complex::<V>::splat(0.0, 0.0); BLOCK]; ROWS];
+        for (motions, weight) in motions.chunks_exact(self.stride).zip(&self.weights) {
             let weight = Complex::<V>::load(weight);
-            let columns = &motions[column..column + COLUMNS];
+            let columns = &motions[column..column + BLOCK];
             let rows = &motions[row..row + ROWS];
             for i in 0..ROWS {
                 let scaled = weight.scale(V::splat(rows[i]));
-                for j in 0..COLUMNS {
+                for j in 0..BLOCK {
                     sums[i][j] = sums[i][j].add_real_product(V::splat(columns[j]), scaled);
                 }
             }
         }
         for i in 0..ROWS {
-            for j in 0..COLUMNS {
+            for j in 0..BLOCK {
                 sums[i][j].store(&mut self.elements[(row + i) * self.stride + column + j]);
                 sums[i][j].store(&mut self.elements[(column + j) * self.stride + row + i]);
             }
@@ -117,8 +116,8 @@ impl Gram {
 
     /// The elastic coordinates `Bᵀ f/e`, for one group of forces f on the motions.
     #[inline(always)]
-    fn elastic<V: Vector>(&self, mode: usize, forces: &[Complexes]) -> Complex<V> {
-        let row = &self.motions[mode * self.stride..][..forces.len()];
+    fn elastic<V: Vector>(&self, row: &[f64], mode: usize, forces: &[Complexes]) -> Complex<V> {
+        let row = &row[..forces.len()];
         let mut sums = [Complex::<V>::splat(0.0, 0.0); 2];
         for (pair, forces) in row.chunks(2).zip(forces.chunks(2)) {
             for i in 0..forces.len() {
@@ -134,18 +133,19 @@ impl Gram {
     #[inline(always)]
     pub fn rounding<V: Vector>(
         &self,
+        motions: &[f64],
         right: &[Complexes],
         left: &[Complexes],
         across: V,
     ) -> V {
         let mut own = V::splat(0.0);
         let mut shared = V::splat(0.0);
-        for (mode, doubt) in self.doubt.iter().enumerate() {
-            let doubt = V::load(doubt);
-            let product = self.elastic::<V>(mode, right).mul(self.elastic::<V>(mode, left));
+        for (mode, row) in motions.chunks_exact(self.stride).enumerate() {
+            let doubt = V::load(&self.doubt[mode]);
+            let product = self.elastic::<V>(row, mode, right);
+            let product = product.mul(self.elastic::<V>(row, mode, left));
             shared = doubt.mul_add(product.square().sqrt(), shared);
-            let weight = Complex::<V>::load(&self.weights[mode]).square().sqrt();
-            own = doubt.mul_add(weight, own);
+            own = doubt.mul_add(V::load(&self.moduli[mode]), own);
         }
         own.add(shared.div(across))
     }

@@ -149,7 +149,7 @@ impl Pencil {
         if self.reduction.count == 0 {
             return self.lead(model);
         }
-        self.gram.set(&self.reduction);
+        self.gram.resize(&self.reduction);
         self.list();
         true
     }
@@ -209,7 +209,7 @@ impl Pencil {
         self.first.push(self.rows.len());
         self.values.resize(self.rows.len(), Complexes::ZERO);
         for forces in &mut self.forces {
-            forces.resize(self.gram.stride, Complexes::ZERO);
+            forces.resize(self.reduction.count, Complexes::ZERO);
         }
     }
 
@@ -415,14 +415,14 @@ impl<V: Vector> Frequencies<V> {
 
 #[inline(always)]
 fn value<V: Vector>(entry: [f64; 3], powers: [Complex<V>; 3]) -> Complex<V> {
-    let [m, d, k] = entry.map(V::splat);
+    let (m, d, k) = (V::splat(entry[0]), V::splat(entry[1]), V::splat(entry[2]));
     let value = powers[2].scale(k).add_real_product(d, powers[1]);
     value.add_real_product(m, powers[0])
 }
 
 #[inline(always)]
 fn modulus<V: Vector>(entry: [f64; 3], moduli: [V; 3]) -> V {
-    let [m, d, k] = entry.map(|value| V::splat(value.abs()));
+    let (m, d, k) = (V::splat(entry[0].abs()), V::splat(entry[1].abs()), V::splat(entry[2].abs()));
     m.mul_add(moduli[0], d.mul_add(moduli[1], k.mul(moduli[2])))
 }
 
@@ -438,7 +438,7 @@ impl Kernel for Evaluate<'_> {
         scale(pencil, &at, &mut exponent);
         let product = match pencil.reduction.count == 0 {
             true => Product::new(),
-            false => pencil.gram.form::<V>(at.powers[0][0], at.moduli[0][0]),
+            false => pencil.gram.form::<V>(&pencil.reduction, at.powers[0][0], at.moduli[0][0]),
         };
         scale_motions::<V>(pencil);
         for i in 0..others {
@@ -525,7 +525,7 @@ fn scale_motions<V: Vector>(pencil: &mut Pencil) {
 fn condense<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) {
     let Pencil { size, gram, entries, degree, order, first, rows, values, lanes, elimination, .. } =
         pencil;
-    let (n, others, stride) = (*size, order.len(), gram.stride);
+    let (n, others, stride) = (*size, order.len(), pencil.reduction.stride);
     let count = n - others;
     // A sum of as many terms as there are modes, then one over motions; Z itself is a product of inverses.
     let roundings = 16.0 + 2.0 * (pencil.reduction.elastic.len() as f64).sqrt();
@@ -576,7 +576,8 @@ fn condense<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) {
 /// with the null vectors that elimination found.
 #[inline(always)]
 fn doubt<V: Vector>(pencil: &mut Pencil) -> V {
-    let Pencil { size, order, gram, first, rows, values, lanes, elimination, forces, .. } = pencil;
+    let Pencil { size, order, reduction, gram, first, rows, values, lanes, elimination, forces, .. } =
+        pencil;
     let others = order.len();
     let count = *size - others;
     for forces in forces.iter_mut() {
@@ -596,7 +597,7 @@ fn doubt<V: Vector>(pencil: &mut Pencil) -> V {
         y.scale(row_scale).store(&mut forces[1][i]);
     }
     let across = V::load(&elimination.across);
-    gram.rounding::<V>(&forces[0][..count], &forces[1][..count], across)
+    gram.rounding::<V>(&reduction.motions, &forces[0], &forces[1], across)
 }
 
 /// The powers at a modulus.

@@ -5,7 +5,7 @@
 
 use super::super::Pair;
 use super::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
-use super::reduction::Reduction;
+use super::reduction::{BLOCK, Reduction};
 use crate::dynamics::Model;
 use faer::c64;
 
@@ -130,28 +130,32 @@ impl Kernel for Reduced<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> [Complexes; 3] {
-        let Reduction { elastic, others, count, own, motions, entries, .. } = self.reduction;
+        let Reduction { elastic, others, count, stride, own, motions, entries, .. } = self.reduction;
         let zero = Complex::<V>::splat(0.0, 0.0);
         let mut forms = [zero; 3];
         let elastic = &self.vectors[elastic.clone()];
         for ([right, left], own) in elastic.iter().zip(own) {
             let product = Complex::<V>::load(right).mul(Complex::load(left));
-            for (form, own) in forms.iter_mut().zip(own) {
-                *form = form.add_real_product(V::splat(*own), product);
+            for kind in 0..3 {
+                forms[kind] = forms[kind].add_real_product(V::splat(own[kind]), product);
             }
         }
         // The motions in both vectors, then the other coordinates.
         let mut seen = vec![[Complexes::ZERO; 2]; count + others.len()];
-        for (motion, seen) in seen[..*count].iter_mut().enumerate() {
-            let mut sums = [zero; 2];
-            for (row, vectors) in motions.chunks_exact(*count).zip(elastic) {
-                let part = V::splat(row[motion]);
-                for side in 0..2 {
-                    sums[side] = sums[side].add_real_product(part, Complex::load(&vectors[side]));
+        for first in (0..*count).step_by(BLOCK) {
+            let mut sums = [[zero; 2]; BLOCK];
+            for (row, vectors) in motions.chunks_exact(*stride).zip(elastic) {
+                let (right, left) = (Complex::<V>::load(&vectors[0]), Complex::load(&vectors[1]));
+                let row = &row[first..first + BLOCK];
+                for i in 0..BLOCK {
+                    let part = V::splat(row[i]);
+                    sums[i][0] = sums[i][0].add_real_product(part, right);
+                    sums[i][1] = sums[i][1].add_real_product(part, left);
                 }
             }
-            for side in 0..2 {
-                sums[side].store(&mut seen[side]);
+            for i in 0..(count - first).min(BLOCK) {
+                sums[i][0].store(&mut seen[first + i][0]);
+                sums[i][1].store(&mut seen[first + i][1]);
             }
         }
         for (seen, other) in seen[*count..].iter_mut().zip(others) {

@@ -11,11 +11,12 @@ use faer::Mat;
 use nalgebra::DMatrix;
 use std::ops::Range;
 
+/// Motions that are summed at once.
+pub const BLOCK: usize = 4;
 /// What is left of a motion, in parts of its largest element, that is of the others.
 const DEPENDENT: f64 = 1e-12;
-/// An element of Z, in parts of the geometric mean of its diagonal elements, that is rounding; or of a and β, in parts of
-/// the terms of which it is the sum.
-const NEGLIGIBLE: f64 = 1e-14;
+/// An element of Z, a or β, in parts of the terms of which it is the sum, that is rounding.
+const ROUNDING: f64 = 1e-14;
 /// Largest part of the terms of a product that may be left out: rounding of the terms.
 const LEFT_OUT: f64 = 1e-12;
 
@@ -30,8 +31,10 @@ pub struct Reduction {
     pub count: usize,
     /// Mass, damping and stiffness of each elastic coordinate by itself.
     pub own: Vec<[f64; 3]>,
-    /// The motions B: a row of `count` per elastic coordinate.
+    /// The motions B: a row per elastic coordinate, ended by zeros to a length of `stride`.
     pub motions: Vec<f64>,
+    /// Number of motions, rounded up to whole blocks.
+    pub stride: usize,
     /// Mass, damping and stiffness `[[Z, a], [β, L]]` over the motions, then the other coordinates, row by row.
     pub entries: Vec<[f64; 3]>,
     /// Rows that may be motions; then what elimination leaves of them.
@@ -93,8 +96,12 @@ impl Reduction {
         let known = &model.interface;
         let (count, n) = (self.elastic.len(), model.second_order);
         self.candidates.clear();
-        let rows = known.motions.chunks_exact(count).filter(|row| row.iter().any(|v| *v != 0.0));
-        rows.for_each(|row| self.candidates.extend(row));
+        // Of a translation or rotation, components that are the rounding of the others are none.
+        for axes in known.motions.chunks_exact(3 * count) {
+            let least = DEPENDENT * largest(axes).1;
+            let rows = axes.chunks_exact(count).filter(|row| largest(row).1 > least);
+            rows.for_each(|row| self.candidates.extend(row));
+        }
         let apart = self.others.iter().filter(|at| **at < self.elastic.start || **at >= n);
         let matrices = [&model.mass, &model.damping, &model.stiffness];
         for &at in apart {
@@ -162,67 +169,63 @@ impl Reduction {
     fn reduce(&mut self, model: &Model) -> bool {
         let (modes, c, first) = (self.elastic.len(), self.count, self.elastic.start);
         let size = c + self.others.len();
-        let rows: Vec<usize> = self.pivots.iter().map(|[row, _]| *row).collect();
-        let columns: Vec<usize> = self.pivots.iter().map(|[_, column]| *column).collect();
-        self.motions.clear();
-        for mode in 0..modes {
-            self.motions.extend(rows.iter().map(|row| self.candidates[row * modes + mode]));
-        }
-        let at_pivots = DMatrix::from_fn(c, c, |i, j| self.candidates[rows[i] * modes + columns[j]]);
+        let columns: Vec<usize> = self.pivots.iter().map(|[_, column]| first + column).collect();
+        let at_pivots = DMatrix::from_fn(c, c, |i, j| {
+            self.candidates[self.pivots[i][0] * modes + self.pivots[j][1]]
+        });
         let Some(inverse) = at_pivots.try_inverse() else { return false };
+        let moduli = inverse.abs();
         self.entries.clear();
         self.entries.resize(size * size, [0.0; 3]);
         let matrices = [&model.mass, &model.damping, &model.stiffness];
         for (kind, matrix) in matrices.into_iter().enumerate() {
-            let element = |i: usize, j: usize| match i == j {
-                true => model.interface.attached[columns[i]][kind],
-                false => matrix[(first + columns[i], first + columns[j])],
-            };
-            let between = DMatrix::from_fn(c, c, element);
+            let between = DMatrix::from_fn(c, c, |i, j| match i == j {
+                true => model.interface.attached[columns[i] - first][kind],
+                false => matrix[(columns[i], columns[j])],
+            });
             if between.iter().any(|value| *value != 0.0) {
+                let sizes = moduli.tr_mul(&between.abs()) * &moduli;
                 let between = inverse.tr_mul(&between) * &inverse;
-                for (index, value) in between.iter().enumerate() {
-                    self.entries[index % c * size + index / c][kind] = *value;
+                for (index, (value, size_of)) in between.iter().zip(&sizes).enumerate() {
+                    if value.abs() > ROUNDING * size_of {
+                        self.entries[index % c * size + index / c][kind] = *value;
+                    }
                 }
             }
             for (j, &other) in self.others.iter().enumerate() {
-                let row: Vec<f64> =
-                    columns.iter().map(|column| matrix[(other, first + column)]).collect();
-                let column: Vec<f64> =
-                    columns.iter().map(|column| matrix[(first + column, other)]).collect();
+                let row = columns.iter().map(|column| matrix[(other, *column)]);
+                let column = columns.iter().map(|column| matrix[(*column, other)]);
                 for i in 0..c {
-                    self.entries[i * size + c + j][kind] = through(inverse.column(i).iter(), &column);
-                    self.entries[(c + j) * size + i][kind] = through(inverse.column(i).iter(), &row);
+                    let factors = inverse.column(i);
+                    self.entries[i * size + c + j][kind] = through(factors.iter(), column.clone());
+                    self.entries[(c + j) * size + i][kind] = through(factors.iter(), row.clone());
                 }
                 for (i, &to) in self.others.iter().enumerate() {
                     self.entries[(c + i) * size + c + j][kind] = matrix[(to, other)];
                 }
             }
         }
-        self.neglect();
+        self.keep_coupled();
         self.entries.iter().flatten().all(|value| value.is_finite())
     }
 
-    /// Makes elements of Z that are rounding exact zeros, so that they cost nothing.
-    fn neglect(&mut self) {
-        let (c, size) = (self.count, self.count + self.others.len());
-        // Frequency at which sizes are compared: the geometric mean of the elastic coordinates'.
-        let logarithms: f64 = self.own.iter().map(|own| own[2].ln()).sum();
-        let square = (logarithms / self.own.len() as f64).exp();
-        let powers = [square, square.sqrt(), 1.0];
-        let modulus = |entry: &[f64; 3]| -> f64 {
-            entry.iter().zip(powers).map(|(value, power)| value.abs() * power).sum()
+    /// Leaves out motions that act on nothing and that nothing acts on.
+    fn keep_coupled(&mut self) {
+        let (modes, size) = (self.elastic.len(), self.count + self.others.len());
+        let entries = &self.entries;
+        let coupled = |i: usize| {
+            (0..size).any(|j| entries[i * size + j] != [0.0; 3] || entries[j * size + i] != [0.0; 3])
         };
-        let diagonal: Vec<f64> =
-            (0..c).map(|i| modulus(&self.entries[i * size + i]).sqrt()).collect();
-        for i in 0..c {
-            for j in 0..c {
-                let entry = &mut self.entries[i * size + j];
-                let least = NEGLIGIBLE * diagonal[i] * diagonal[j];
-                if i != j && modulus(entry) <= least {
-                    *entry = [0.0; 3];
-                }
-            }
+        let kept: Vec<usize> = (0..size).filter(|i| *i >= self.count || coupled(*i)).collect();
+        let entry = |i: &usize, j: &usize| entries[i * size + j];
+        self.entries = kept.iter().flat_map(|i| kept.iter().map(move |j| entry(i, j))).collect();
+        self.count = kept.len() - self.others.len();
+        self.stride = self.count.next_multiple_of(BLOCK);
+        self.motions.clear();
+        for mode in 0..modes {
+            let rows = kept[..self.count].iter().map(|i| self.pivots[*i][0]);
+            self.motions.extend(rows.map(|row| self.candidates[row * modes + mode]));
+            self.motions.resize((mode + 1) * self.stride, 0.0);
         }
     }
 
@@ -233,7 +236,7 @@ impl Reduction {
         let sign = |at: usize| if (at * at + at / 3) % 5 < 2 { -1.0 } else { 1.0 };
         // What the motions see of the signs, and could see at most.
         let mut seen = vec![[0.0; 2]; c];
-        for (mode, row) in self.motions.chunks_exact(c.max(1)).enumerate() {
+        for (mode, row) in self.motions.chunks_exact(self.stride).enumerate() {
             for (seen, motion) in seen.iter_mut().zip(row) {
                 seen[0] += motion * sign(first + mode);
                 seen[1] += motion.abs();
@@ -242,7 +245,8 @@ impl Reduction {
         let agree = |value: f64, [sum, size]: [f64; 2]| (value - sum).abs() <= LEFT_OUT * size;
         let matrices = [&model.mass, &model.damping, &model.stiffness];
         matrices.into_iter().enumerate().all(|(kind, matrix)| {
-            [false, true].into_iter().all(|transposed| {
+            let products = times_signs(matrix, &self.elastic, sign);
+            [false, true].into_iter().zip(products).all(|(transposed, product)| {
                 let entry = |i: usize, j: usize| match transposed {
                     false => self.entries[i * size + j][kind],
                     true => self.entries[j * size + i][kind],
@@ -255,10 +259,9 @@ impl Reduction {
                     })
                 };
                 let forces: Vec<[f64; 2]> = (0..c).map(force).collect();
-                let product = times_signs(matrix, transposed, &self.elastic, sign);
                 let elastic = (0..self.elastic.len()).all(|mode| {
                     let own = model.interface.own[mode][kind];
-                    let row = &self.motions[mode * c..][..c];
+                    let row = &self.motions[mode * self.stride..][..c];
                     let start = [own * sign(first + mode), own.abs()];
                     let expected = row.iter().zip(&forces).fold(start, |[sum, most], (b, f)| {
                         [sum + b * f[0], most + b.abs() * f[1]]
@@ -275,13 +278,16 @@ impl Reduction {
 }
 
 /// A sum of products, zero where it is but rounding.
-fn through<'a>(factors: impl IntoIterator<Item = &'a f64>, values: &[f64]) -> f64 {
+fn through<'a>(
+    factors: impl IntoIterator<Item = &'a f64>,
+    values: impl IntoIterator<Item = f64>,
+) -> f64 {
     let (mut sum, mut size) = (0.0_f64, 0.0);
     for (factor, value) in factors.into_iter().zip(values) {
         sum += factor * value;
         size += (factor * value).abs();
     }
-    if sum.abs() > NEGLIGIBLE * size { sum } else { 0.0 }
+    if sum.abs() > ROUNDING * size { sum } else { 0.0 }
 }
 
 /// Place and modulus of the largest element.
@@ -290,25 +296,29 @@ fn largest(row: &[f64]) -> (usize, f64) {
     (row.iter().position(|value| value.abs() == most).unwrap_or(0), most)
 }
 
-/// A matrix, or its transpose, times signs in `range` and zeros elsewhere.
+/// A matrix and its transpose, each times signs in `range` and zeros elsewhere.
 fn times_signs(
     matrix: &Mat<f64>,
-    transposed: bool,
     range: &Range<usize>,
     sign: impl Fn(usize) -> f64,
-) -> Vec<f64> {
-    let signs: Vec<f64> = range.clone().map(sign).collect();
-    if transposed {
-        let product = |column: usize| {
-            let values = &matrix.col_as_slice(column)[range.clone()];
-            values.iter().zip(&signs).map(|(value, sign)| value * sign).sum()
-        };
-        return (0..matrix.ncols()).map(product).collect();
-    }
+) -> [Vec<f64>; 2] {
+    let signs: Vec<f64> = range.clone().map(&sign).collect();
     let mut product = vec![0.0; matrix.nrows()];
-    for (column, sign) in range.clone().zip(signs) {
+    let mut transposed = vec![0.0; matrix.ncols()];
+    for (column, transposed) in transposed.iter_mut().enumerate() {
         let values = matrix.col_as_slice(column);
-        product.iter_mut().zip(values).for_each(|(sum, value)| *sum += sign * value);
+        if range.contains(&column) {
+            let sign = sign(column);
+            product.iter_mut().zip(values).for_each(|(sum, value)| *sum += sign * value);
+        }
+        // Four sums, so that one need not wait for another.
+        let mut sums = [0.0; 4];
+        for (values, signs) in values[range.clone()].chunks(4).zip(signs.chunks(4)) {
+            for ((sum, value), sign) in sums.iter_mut().zip(values).zip(signs) {
+                *sum += value * sign;
+            }
+        }
+        *transposed = sums.iter().sum();
     }
-    product
+    [product, transposed]
 }
