@@ -444,6 +444,81 @@ impl Elimination {
         if dense { first } else { self.filled.next(row, first) }
     }
 
+    /// Solves with the factors: right sides by row of the matrix, solutions by column.
+    #[inline(always)]
+    pub fn solve<V: Vector>(&mut self, right_side: &[Complexes], to: &mut [Complexes]) {
+        let n = self.size;
+        for i in 0..n {
+            self.gather(i, right_side);
+            let row = self.rows[i];
+            let mut sum = Complex::<V>::load(&self.column[i]);
+            let mut k = self.next(i, row, 0);
+            while k < i {
+                let l = Complex::load(&self.matrix[row * n + k]);
+                sum = sum.subtract_product(l, Complex::load(&self.column[k]));
+                k = self.next(i, row, k + 1);
+            }
+            sum.store(&mut self.column[i]);
+        }
+        for k in (0..n).rev() {
+            let row = self.rows[k];
+            let mut sum = Complex::<V>::load(&self.column[k]);
+            let mut j = self.next(k, row, k + 1);
+            while j < n {
+                let u = Complex::<V>::load(&self.matrix[row * n + j]);
+                sum = sum.subtract_product(u, Complex::load(&to[j]));
+                j = self.next(k, row, j + 1);
+            }
+            sum.mul(Complex::load(&self.matrix[row * n + k])).store(&mut to[k]);
+        }
+    }
+
+    /// Solves with the transposed factors: right sides by column of the matrix, solutions by row.
+    #[inline(always)]
+    pub fn solve_transposed<V: Vector>(&mut self, right_side: &[Complexes], to: &mut [Complexes]) {
+        let n = self.size;
+        self.column.copy_from_slice(right_side);
+        for i in 0..n {
+            let row = self.rows[i];
+            let inverse = Complex::load(&self.matrix[row * n + i]);
+            let a = Complex::<V>::load(&self.column[i]).mul(inverse);
+            a.store(&mut self.column[i]);
+            let mut k = self.next(i, row, i + 1);
+            while k < n {
+                let u = Complex::load(&self.matrix[row * n + k]);
+                let value = Complex::<V>::load(&self.column[k]);
+                value.subtract_product(a, u).store(&mut self.column[k]);
+                k = self.next(i, row, k + 1);
+            }
+        }
+        for i in (0..n).rev() {
+            let row = self.rows[i];
+            let b = Complex::<V>::load(&self.column[i]);
+            let mut k = self.next(i, row, 0);
+            while k < i {
+                let l = Complex::load(&self.matrix[row * n + k]);
+                let value = Complex::<V>::load(&self.column[k]);
+                value.subtract_product(b, l).store(&mut self.column[k]);
+                k = self.next(i, row, k + 1);
+            }
+            for lane in 0..WIDTH {
+                let row = usize::from(self.origin[i][lane]);
+                to[row].re[lane] = self.column[i].re[lane];
+                to[row].im[lane] = self.column[i].im[lane];
+            }
+        }
+    }
+
+    /// Puts the right side of the row at a place there, lane by lane.
+    #[inline(always)]
+    fn gather(&mut self, place: usize, right_side: &[Complexes]) {
+        for lane in 0..WIDTH {
+            let from = &right_side[usize::from(self.origin[place][lane])];
+            self.column[place].re[lane] = from.re[lane];
+            self.column[place].im[lane] = from.im[lane];
+        }
+    }
+
     /// Bound of the relative error of the determinants by rounding.
     ///
     /// The factors are those of A + E, and `det(A + E)/det A − 1 = tr A⁻¹E` to first order. An element of E gathers

@@ -114,9 +114,15 @@ impl Gram {
         }
     }
 
-    /// The elastic coordinates `Bᵀ f/e`, for one group of forces f on the motions.
+    /// 1/e of an elastic coordinate.
     #[inline(always)]
-    fn elastic<V: Vector>(&self, row: &[f64], mode: usize, forces: &[Complexes]) -> Complex<V> {
+    pub fn weight<V: Vector>(&self, mode: usize) -> Complex<V> {
+        Complex::load(&self.weights[mode])
+    }
+
+    /// The elastic coordinate `bᵀ f/e`, b its row of motions and f forces on these.
+    #[inline(always)]
+    pub fn elastic<V: Vector>(&self, row: &[f64], mode: usize, forces: &[Complexes]) -> Complex<V> {
         let row = &row[..forces.len()];
         let mut sums = [Complex::<V>::splat(0.0, 0.0); 2];
         for (pair, forces) in row.chunks(2).zip(forces.chunks(2)) {

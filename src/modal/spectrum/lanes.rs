@@ -16,7 +16,7 @@ const RECIPROCAL_BITS: u64 = 0x7fe0_0000_0000_0000;
 const BIAS: f64 = 4_503_599_627_370_496.0 + 1023.0;
 
 /// Eight complex numbers as they lie in memory.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(C, align(64))]
 pub struct Complexes {
     /// Real parts.

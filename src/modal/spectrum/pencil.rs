@@ -8,7 +8,7 @@
 use super::elimination::{Determinants, Elimination};
 use super::gram::Gram;
 use super::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
-use super::reduction::Reduction;
+use super::reduction::{BLOCK, MOST_MOTIONS, Reduction};
 use super::scaled::{self, Product, Scaled};
 use crate::dynamics::Model;
 use faer::c64;
@@ -38,6 +38,8 @@ pub struct Pencil {
     first: Vec<usize>,
     rows: Vec<usize>,
     values: Vec<Complexes>,
+    /// Places of all entries that are not zero, of a reduced model.
+    occupied: Vec<[usize; 2]>,
     /// Forces on motions in the null vectors.
     forces: [Vec<Complexes>; 2],
     /// Scales of rows and columns at the typical modulus.
@@ -68,6 +70,7 @@ impl Pencil {
             first: Vec::new(),
             rows: Vec::new(),
             values: Vec::new(),
+            occupied: Vec::new(),
             forces: [Vec::new(), Vec::new()],
             scale: [Vec::new(), Vec::new()],
             lanes: [Vec::new(), Vec::new()],
@@ -140,7 +143,9 @@ impl Pencil {
         let forced: Vec<bool> = (0..size)
             .map(|column| (others..size).any(|row| entries[row * size + column] != [0.0; 3]))
             .collect();
-        self.elimination.shape(size, self.states, |row, column| {
+        // Gimbals and the like see a few motions each.
+        let sparse = if self.reduction.count > 0 { others } else { self.states };
+        self.elimination.shape(size, sparse, |row, column| {
             if row < others { entries[row * size + column] != [0.0; 3] } else { forced[column] || row == column }
         });
         if !self.entries.iter().flatten().all(|value| value.is_finite()) {
@@ -208,6 +213,9 @@ impl Pencil {
         }
         self.first.push(self.rows.len());
         self.values.resize(self.rows.len(), Complexes::ZERO);
+        let places = (0..size).flat_map(|i| (0..size).map(move |j| [i, j]));
+        self.occupied.clear();
+        self.occupied.extend(places.filter(|[i, j]| self.entries[i * size + j] != [0.0; 3]));
         for forces in &mut self.forces {
             forces.resize(self.reduction.count, Complexes::ZERO);
         }
@@ -353,37 +361,292 @@ impl Pencil {
         self.typical = modulus;
     }
 
-    /// Takes the leading coefficient of a reduced model: the form of the highest powers.
-    pub fn lead_reduced(&mut self, level: Level) {
-        if self.reduction.count > 0 {
-            let found = level.run(Evaluate { pencil: self, points: None });
-            (self.leading, self.leading_error) = (found.value[0], found.error[0]);
+    /// The determinants at eight frequencies, rad/s; at an infinite one the coefficient of the highest power, which is
+    /// evaluated so for reduced models alone.
+    pub fn evaluate(&mut self, level: Level, points: &Complexes) -> Determinants {
+        level.run(Evaluate { pencil: self, points })
+    }
+
+    /// The leading coefficient with the bound of its relative error, where it is known without evaluation.
+    pub fn leading(&self) -> Option<(Scaled, f64)> {
+        (self.reduction.count == 0).then_some((self.leading, self.leading_error))
+    }
+}
+
+/// Products and solutions of a reduced model; vectors are over the other places, then the elastic coordinates.
+impl Pencil {
+    /// Number of elements of a vector.
+    pub fn places(&self) -> usize {
+        self.order.len() + self.reduction.elastic.len()
+    }
+
+    /// Number of places of the matrix that is eliminated.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Factors the matrices at eight frequencies.
+    #[inline(always)]
+    pub fn factor<V: Vector>(&mut self, points: &Complexes) {
+        Evaluate { pencil: self, points }.run::<V>();
+    }
+
+    /// The null vectors that the factors gave.
+    #[inline(always)]
+    pub fn null_vectors<V: Vector>(&self, right: &mut [Complexes], left: &mut [Complexes]) {
+        let others = self.order.len();
+        for i in 0..others {
+            let (rows, columns) = (V::load(&self.lanes[0][i]), V::load(&self.lanes[1][i]));
+            Complex::<V>::load(&self.elimination.right[i]).scale(columns).store(&mut right[i]);
+            Complex::<V>::load(&self.elimination.left[i]).scale(rows).store(&mut left[i]);
+        }
+        let minus = V::splat(-1.0);
+        let rows = self.reduction.motions.chunks_exact(self.reduction.stride);
+        for (mode, row) in rows.enumerate() {
+            let value = self.gram.elastic::<V>(row, mode, &self.forces[0]).scale(minus);
+            value.store(&mut right[others + mode]);
+            self.gram.elastic::<V>(row, mode, &self.forces[1]).store(&mut left[others + mode]);
         }
     }
 
-    /// The polynomial over its leading coefficient at eight frequencies, rad/s.
-    pub fn evaluate(&mut self, level: Level, points: &Complexes) -> Determinants {
-        let mut found = level.run(Evaluate { pencil: self, points: Some(points) });
-        for (value, error) in found.value.iter_mut().zip(&mut found.error) {
-            *value = value.over(self.leading);
-            *error += self.leading_error;
+    /// What the motions see of the elastic coordinates.
+    #[inline(always)]
+    fn see<V: Vector>(&self, elastic: &[Complexes], weighted: bool, motions: &mut [Complexes]) {
+        let stride = self.reduction.stride;
+        for first in (0..motions.len()).step_by(BLOCK) {
+            let mut sums = [Complex::<V>::splat(0.0, 0.0); BLOCK];
+            let rows = self.reduction.motions.chunks_exact(stride);
+            for (mode, row) in rows.enumerate() {
+                let mut value = Complex::<V>::load(&elastic[mode]);
+                if weighted {
+                    value = value.mul(self.gram.weight::<V>(mode));
+                }
+                let row = &row[first..first + BLOCK];
+                for i in 0..BLOCK {
+                    sums[i] = sums[i].add_real_product(V::splat(row[i]), value);
+                }
+            }
+            for i in 0..BLOCK.min(motions.len() - first) {
+                sums[i].store(&mut motions[first + i]);
+            }
         }
-        found
+    }
+
+    /// The matrix with these powers for s², s and 1, times a vector; with factors of the full damping and stiffness.
+    #[inline(always)]
+    pub fn apply<V: Vector>(
+        &self,
+        at: &Frequencies<V>,
+        full: Option<[Complex<V>; 2]>,
+        x: &[Complexes],
+        core: &mut [Complexes],
+        to: &mut [Complexes],
+    ) {
+        self.product::<V>(at, full, false, x, core, to);
+    }
+
+    /// The same with the transpose.
+    #[inline(always)]
+    pub fn apply_transposed<V: Vector>(
+        &self,
+        at: &Frequencies<V>,
+        full: Option<[Complex<V>; 2]>,
+        x: &[Complexes],
+        core: &mut [Complexes],
+        to: &mut [Complexes],
+    ) {
+        self.product::<V>(at, full, true, x, core, to);
+    }
+
+    #[inline(always)]
+    fn product<V: Vector>(
+        &self,
+        at: &Frequencies<V>,
+        full: Option<[Complex<V>; 2]>,
+        transposed: bool,
+        x: &[Complexes],
+        core: &mut [Complexes],
+        to: &mut [Complexes],
+    ) {
+        let others = self.order.len();
+        let (elastic, stride) = (&x[others..], self.reduction.stride);
+        self.see::<V>(elastic, false, &mut core[others..]);
+        // Sums over others gather in `to`, forces on motions beside.
+        let mut forces = [Complexes::ZERO; MOST_MOTIONS];
+        to[..others].fill(Complexes::ZERO);
+        core[..others].copy_from_slice(&x[..others]);
+        for &[row, column] in &self.occupied {
+            let entry = self.entries[row * self.size + column];
+            let value = value::<V>(entry, at.powers[0][self.degree[column]]);
+            let (from, into) = if transposed { (row, column) } else { (column, row) };
+            let sum = match into < others {
+                true => &mut to[into],
+                false => &mut forces[into - others],
+            };
+            Complex::<V>::load(sum).add(value.mul(Complex::load(&core[from]))).store(sum);
+        }
+        let forces = &forces[..self.reduction.count];
+        let rows = self.reduction.motions.chunks_exact(stride);
+        for (mode, row) in rows.enumerate() {
+            let own = value::<V>(self.reduction.own[mode], at.powers[0][0]);
+            let mut sum = own.mul(Complex::load(&elastic[mode]));
+            for i in 0..forces.len() {
+                sum = sum.add_real_product(V::splat(row[i]), Complex::load(&forces[i]));
+            }
+            sum.store(&mut to[others + mode]);
+        }
+        let Some(factors) = full else { return };
+        for kind in 0..2 {
+            let matrix = &self.reduction.full[kind][usize::from(transposed)];
+            if !matrix.is_empty() {
+                add_product::<V>(matrix, factors[kind], elastic, &mut to[others..]);
+            }
+        }
+    }
+
+    /// The solution with the factors, in place.
+    #[inline(always)]
+    pub fn solve<V: Vector>(&mut self, r: &mut [Complexes], core: &mut [Vec<Complexes>; 2]) {
+        let others = self.order.len();
+        let [right_side, solution] = core;
+        right_side[..others].copy_from_slice(&r[..others]);
+        self.see::<V>(&r[others..], true, &mut right_side[others..]);
+        for i in 0..self.size {
+            let value = Complex::<V>::load(&right_side[i]).scale(V::load(&self.lanes[0][i]));
+            value.store(&mut right_side[i]);
+        }
+        self.elimination.solve::<V>(right_side, solution);
+        // Forces on motions, with the entries as they were scaled by columns.
+        let mut forces = [Complexes::ZERO; MOST_MOTIONS];
+        for j in 0..self.size {
+            let value = Complex::<V>::load(&solution[j]);
+            for at in self.first[j]..self.first[j + 1] {
+                let sum = &mut forces[self.rows[at]];
+                let product = Complex::<V>::load(&self.values[at]).mul(value);
+                Complex::<V>::load(sum).add(product).store(sum);
+            }
+        }
+        for i in 0..others {
+            let value = Complex::<V>::load(&solution[i]).scale(V::load(&self.lanes[1][i]));
+            value.store(&mut r[i]);
+        }
+        self.substitute::<V>(&forces[..self.reduction.count], V::splat(-1.0), &mut r[others..]);
+    }
+
+    /// The solution with the transposed factors, in place; `at` are the powers they were made with.
+    #[inline(always)]
+    pub fn solve_transposed<V: Vector>(
+        &mut self,
+        at: &Frequencies<V>,
+        r: &mut [Complexes],
+        core: &mut [Vec<Complexes>; 2],
+    ) {
+        let others = self.order.len();
+        let [right_side, solution] = core;
+        let mut seen = [Complexes::ZERO; MOST_MOTIONS];
+        self.see::<V>(&r[others..], true, &mut seen[..self.reduction.count]);
+        right_side[..others].copy_from_slice(&r[..others]);
+        right_side[others..].fill(Complexes::ZERO);
+        for j in 0..self.size {
+            let mut sum = Complex::<V>::load(&right_side[j]);
+            for item in self.first[j]..self.first[j + 1] {
+                let row = self.rows[item];
+                let entry = self.entries[(others + row) * self.size + j];
+                let value = value::<V>(entry, at.powers[0][self.degree[j]]);
+                sum = sum.subtract_product(value, Complex::load(&seen[row]));
+            }
+            sum.scale(V::load(&self.lanes[1][j])).store(&mut right_side[j]);
+        }
+        self.elimination.solve_transposed::<V>(right_side, solution);
+        for i in 0..self.size {
+            let value = Complex::<V>::load(&solution[i]).scale(V::load(&self.lanes[0][i]));
+            value.store(if i < others { &mut r[i] } else { &mut seen[i - others] });
+        }
+        self.substitute::<V>(&seen[..self.reduction.count], V::splat(1.0), &mut r[others..]);
+    }
+
+    /// `(r + sign Bᵀ f)/e`, in place.
+    #[inline(always)]
+    fn substitute<V: Vector>(&self, forces: &[Complexes], sign: V, r: &mut [Complexes]) {
+        let rows = self.reduction.motions.chunks_exact(self.reduction.stride);
+        for (mode, row) in rows.enumerate() {
+            let force = self.gram.elastic::<V>(row, mode, forces).scale(sign);
+            let own = Complex::<V>::load(&r[mode]).mul(self.gram.weight::<V>(mode));
+            own.add(force).store(&mut r[mode]);
+        }
+    }
+
+    /// `Σ|y||r|`, and what rounding does to `yᵀ L x` in units of the unit roundoff.
+    #[inline(always)]
+    pub fn uncertainty<V: Vector>(
+        &self,
+        at: &Frequencies<V>,
+        right: &[Complexes],
+        left: &[Complexes],
+        residual: &[Complexes],
+    ) -> (Complex<V>, V) {
+        let others = self.order.len();
+        let modes = self.reduction.own.len() as f64;
+        let (mut first, mut size) = (V::splat(0.0), V::splat(0.0));
+        for i in 0..right.len() {
+            let own = match i.checked_sub(others) {
+                Some(mode) => modulus::<V>(self.reduction.own[mode], at.moduli[0][0]),
+                None => modulus::<V>(self.entries[i * self.size + i], at.moduli[0][self.degree[i]]),
+            };
+            let y = Complex::<V>::load(&left[i]).square().sqrt();
+            let x = Complex::<V>::load(&right[i]).square().sqrt();
+            first = y.mul_add(Complex::<V>::load(&residual[i]).square().sqrt(), first);
+            size = own.mul(y).mul_add(x, size);
+        }
+        // Own terms, the forces that balance them, and sums over motions and the full part.
+        let rounding = size.mul(V::splat(16.0 + 4.0 * modes.sqrt()));
+        (Complex { re: first, im: V::splat(0.0) }, rounding)
+    }
+}
+
+/// `to += factor · matrix · x` with a real square matrix, row by row.
+#[inline(always)]
+fn add_product<V: Vector>(matrix: &[f64], factor: Complex<V>, x: &[Complexes], to: &mut [Complexes]) {
+    let count = x.len();
+    for first in (0..count).step_by(BLOCK) {
+        let rows = (count - first).min(BLOCK);
+        let mut sums = [Complex::<V>::splat(0.0, 0.0); BLOCK];
+        // The last block takes the last row again and again.
+        let mut starts = [0; BLOCK];
+        for i in 0..BLOCK {
+            starts[i] = (first + i.min(rows - 1)) * count;
+        }
+        let lines = [
+            &matrix[starts[0]..starts[0] + count],
+            &matrix[starts[1]..starts[1] + count],
+            &matrix[starts[2]..starts[2] + count],
+            &matrix[starts[3]..starts[3] + count],
+        ];
+        for column in 0..count {
+            let value = Complex::<V>::load(&x[column]);
+            for i in 0..BLOCK {
+                sums[i] = sums[i].add_real_product(V::splat(lines[i][column]), value);
+            }
+        }
+        for i in 0..rows {
+            let sum = Complex::<V>::load(&to[first + i]).add(sums[i].mul(factor));
+            sum.store(&mut to[first + i]);
+        }
     }
 }
 
 /// Powers of s that go with the coefficients of an entry from whose column a power was divided out.
 type Powers<T> = [[T; 3]; 3];
 
-/// Fills in the scaled matrices and eliminates: at frequencies, or the form of the highest powers.
+/// Fills in the scaled matrices and eliminates.
 struct Evaluate<'a> {
     pencil: &'a mut Pencil,
-    points: Option<&'a Complexes>,
+    points: &'a Complexes,
 }
 
-/// Powers of s, of its modulus, and the scale of a column from which a power was divided out.
+/// Powers of s and of its modulus.
 #[derive(Clone, Copy)]
-struct Frequencies<V> {
+pub struct Frequencies<V> {
     /// In second-order rows, in first-order rows.
     powers: [Powers<Complex<V>>; 2],
     moduli: [Powers<V>; 2],
@@ -391,25 +654,44 @@ struct Frequencies<V> {
 }
 
 impl<V: Vector> Frequencies<V> {
+    /// At infinity only the highest powers count: s² in second-order rows, s in first-order ones.
     #[inline(always)]
-    fn new(points: Option<&Complexes>, typical: f64) -> Self {
-        let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        let [zeros, ones] = [zero, one].map(|re| Complex { re, im: zero });
-        let Some(points) = points else {
-            let (powers, moduli) = ([ones, zeros, zeros], [one, zero, zero]);
-            let first = ([zeros, ones, zeros], [zero, one, zero]);
-            return Self {
-                powers: [[powers; 3], [first.0; 3]],
-                moduli: [[moduli; 3], [first.1; 3]],
-                modulus: V::splat(typical),
-            };
-        };
+    pub fn new(points: &Complexes, typical: f64) -> Self {
+        let (zero, one, far) = (V::splat(0.0), V::splat(1.0), V::splat(f64::MAX));
+        let [zeros, ones] = [Complex { re: zero, im: zero }, Complex { re: one, im: zero }];
         let s = Complex::<V>::load(points);
+        let infinite = s.re;
+        let s = Complex::where_greater(infinite, far, ones, s);
         let square = s.square().max(V::splat(f64::MIN_POSITIVE));
-        let modulus = square.sqrt();
-        let powers = [[s.mul(s), s, ones], [s, ones, zeros], [ones, zeros, zeros]];
-        let moduli = [[square, modulus, one], [modulus, one, zero], [one, zero, zero]];
-        Self { powers: [powers; 2], moduli: [moduli; 2], modulus }
+        let modulus = infinite.where_greater(far, V::splat(typical), square.sqrt());
+        let second = [(s.mul(s), square), (s, modulus), (ones, one), (zeros, zero), (zeros, zero)];
+        let mut found = Self {
+            powers: [[[zeros; 3]; 3]; 2],
+            moduli: [[[zero; 3]; 3]; 2],
+            modulus,
+        };
+        for degree in 0..3 {
+            for kind in 0..3 {
+                let (power, modulus) = second[degree + kind];
+                for row in 0..2 {
+                    let (highest, size) = if kind == row { (ones, one) } else { (zeros, zero) };
+                    found.powers[row][degree][kind] =
+                        Complex::where_greater(infinite, far, highest, power);
+                    found.moduli[row][degree][kind] = infinite.where_greater(far, size, modulus);
+                }
+            }
+        }
+        found
+    }
+
+    /// What the powers become when the polynomial is derived by s; moduli are left at zero.
+    #[inline(always)]
+    pub fn slope(s: Complex<V>) -> Self {
+        let zeros = Complex::splat(0.0, 0.0);
+        let ones = Complex::splat(1.0, 0.0);
+        let powers = [[s.add(s), ones, zeros], [ones, zeros, zeros], [zeros; 3]];
+        let none = V::splat(0.0);
+        Self { powers: [powers; 2], moduli: [[[none; 3]; 3]; 2], modulus: none }
     }
 }
 

@@ -13,6 +13,8 @@ use std::ops::Range;
 
 /// Motions that are summed at once.
 pub const BLOCK: usize = 4;
+/// Most motions of a reduction; more would pay with many hundreds of modes alone.
+pub const MOST_MOTIONS: usize = 128;
 /// What is left of a motion, in parts of its largest element, that is of the others.
 const DEPENDENT: f64 = 1e-12;
 /// An element of Z, a or β, in parts of the terms of which it is the sum, that is rounding.
@@ -37,6 +39,9 @@ pub struct Reduction {
     pub stride: usize,
     /// Mass, damping and stiffness `[[Z, a], [β, L]]` over the motions, then the other coordinates, row by row.
     pub entries: Vec<[f64; 3]>,
+    /// What is of no few motions, less its diagonal, which is in `own`: damping and stiffness, and their transposes, square
+    /// and row by row; empty where there is none.
+    pub full: [[Vec<f64>; 2]; 2],
     /// Rows that may be motions; then what elimination leaves of them.
     candidates: Vec<f64>,
     left: Vec<f64>,
@@ -57,6 +62,11 @@ impl Reduction {
         effort(self.elastic.len(), self.count, self.others.len())
     }
 
+    /// Whether the model has a part of no few motions.
+    pub fn is_full(&self) -> bool {
+        self.count > 0 && self.full.iter().any(|[plain, _]| !plain.is_empty())
+    }
+
     /// Takes a model: its interface, or no elastic coordinates where there is none, or none that pays.
     pub fn set(&mut self, model: &Model) {
         let size = model.coordinates();
@@ -71,9 +81,6 @@ impl Reduction {
 
     fn find(&mut self, model: &Model) -> bool {
         let known = &model.interface;
-        if known.full.iter().any(|full| !full.is_empty()) {
-            return false;
-        }
         let size = model.coordinates();
         let elastic = self.elastic.clone();
         self.others.clear();
@@ -88,6 +95,24 @@ impl Reduction {
         }
         self.own.clear();
         self.own.extend(&known.own);
+        for (kind, full) in known.full.iter().enumerate() {
+            let count = elastic.len();
+            let [plain, transposed] = &mut self.full[kind];
+            plain.clone_from(full);
+            transposed.clear();
+            if full.is_empty() {
+                continue;
+            }
+            for (mode, own) in self.own.iter_mut().enumerate() {
+                own[kind + 1] += std::mem::take(&mut plain[mode * count + mode]);
+            }
+            transposed.resize(count * count, 0.0);
+            for (row, values) in plain.chunks_exact(count).enumerate() {
+                for (column, value) in values.iter().enumerate() {
+                    transposed[column * count + row] = *value;
+                }
+            }
+        }
         self.reduce(model) && self.complete(model)
     }
 
@@ -141,7 +166,7 @@ impl Reduction {
             if !(size > DEPENDENT) {
                 break;
             }
-            if !worth(self.pivots.len() + 1) {
+            if self.pivots.len() == MOST_MOTIONS || !worth(self.pivots.len() + 1) {
                 return false;
             }
             open.remove(at);
@@ -175,13 +200,14 @@ impl Reduction {
         });
         let Some(inverse) = at_pivots.try_inverse() else { return false };
         let moduli = inverse.abs();
+        let (mut row, mut column) = (Vec::with_capacity(c), Vec::with_capacity(c));
         self.entries.clear();
         self.entries.resize(size * size, [0.0; 3]);
         let matrices = [&model.mass, &model.damping, &model.stiffness];
         for (kind, matrix) in matrices.into_iter().enumerate() {
             let between = DMatrix::from_fn(c, c, |i, j| match i == j {
                 true => model.interface.attached[columns[i] - first][kind],
-                false => matrix[(columns[i], columns[j])],
+                false => matrix[(columns[i], columns[j])] - self.full_at(kind, columns[i], columns[j]),
             });
             if between.iter().any(|value| *value != 0.0) {
                 let sizes = moduli.tr_mul(&between.abs()) * &moduli;
@@ -193,12 +219,14 @@ impl Reduction {
                 }
             }
             for (j, &other) in self.others.iter().enumerate() {
-                let row = columns.iter().map(|column| matrix[(other, *column)]);
-                let column = columns.iter().map(|column| matrix[(*column, other)]);
-                for i in 0..c {
-                    let factors = inverse.column(i);
-                    self.entries[i * size + c + j][kind] = through(factors.iter(), column.clone());
-                    self.entries[(c + j) * size + i][kind] = through(factors.iter(), row.clone());
+                row.clear();
+                row.extend(columns.iter().map(|column| matrix[(other, *column)]));
+                let values = matrix.col_as_slice(other);
+                column.clear();
+                column.extend(columns.iter().map(|column| values[*column]));
+                for (i, factors) in inverse.as_slice().chunks_exact(c).enumerate() {
+                    self.entries[i * size + c + j][kind] = through(factors, &column);
+                    self.entries[(c + j) * size + i][kind] = through(factors, &row);
                 }
                 for (i, &to) in self.others.iter().enumerate() {
                     self.entries[(c + i) * size + c + j][kind] = matrix[(to, other)];
@@ -207,6 +235,14 @@ impl Reduction {
         }
         self.keep_coupled();
         self.entries.iter().flatten().all(|value| value.is_finite())
+    }
+
+    /// Element of the full part of mass, damping or stiffness.
+    fn full_at(&self, kind: usize, row: usize, column: usize) -> f64 {
+        let first = self.elastic.start;
+        let full = kind.checked_sub(1).map(|kind| &self.full[kind][0]);
+        let at = (row - first) * self.elastic.len() + column - first;
+        full.and_then(|full| full.get(at)).copied().unwrap_or(0.0)
     }
 
     /// Leaves out motions that act on nothing and that nothing acts on.
@@ -243,47 +279,62 @@ impl Reduction {
             }
         }
         let agree = |value: f64, [sum, size]: [f64; 2]| (value - sum).abs() <= LEFT_OUT * size;
-        let matrices = [&model.mass, &model.damping, &model.stiffness];
-        matrices.into_iter().enumerate().all(|(kind, matrix)| {
-            let products = times_signs(matrix, &self.elastic, sign);
-            [false, true].into_iter().zip(products).all(|(transposed, product)| {
-                let entry = |i: usize, j: usize| match transposed {
-                    false => self.entries[i * size + j][kind],
-                    true => self.entries[j * size + i][kind],
-                };
-                // Forces on a row of the reduced form: the sum, and the sum of moduli.
-                let force = |i: usize| {
-                    (0..c).fold([0.0; 2], |[sum, most], j| {
-                        let entry = entry(i, j);
-                        [sum + entry * seen[j][0], most + entry.abs() * seen[j][1]]
+        // All three at once, at a typical frequency: what is left out of one is not made up for by another.
+        let logarithms: f64 = self.own.iter().map(|own| own[2].ln()).sum();
+        let square = (logarithms / self.own.len() as f64).exp();
+        let powers = [square, square.sqrt(), 1.0];
+        let at = |entry: [f64; 3]| entry[0] * powers[0] + entry[1] * powers[1] + entry[2];
+        let mut products = [vec![0.0; model.coordinates()], vec![0.0; model.coordinates()]];
+        for (matrix, power) in [&model.mass, &model.damping, &model.stiffness].into_iter().zip(powers) {
+            times_signs(matrix, power, &self.elastic, sign, &mut products);
+        }
+        [false, true].into_iter().zip(&products).all(|(transposed, product)| {
+            let entry = |i: usize, j: usize| match transposed {
+                false => at(self.entries[i * size + j]),
+                true => at(self.entries[j * size + i]),
+            };
+            // Forces on a row of the reduced form: the sum, and the sum of moduli.
+            let force = |i: usize| {
+                (0..c).fold([0.0; 2], |[sum, most], j| {
+                    let entry = entry(i, j);
+                    [sum + entry * seen[j][0], most + entry.abs() * seen[j][1]]
+                })
+            };
+            let forces: Vec<[f64; 2]> = (0..c).map(force).collect();
+            let full = |mode: usize| {
+                let sum = |kind: usize| {
+                    let matrix = &self.full[kind][usize::from(transposed)];
+                    let row = matrix.chunks_exact(self.elastic.len()).nth(mode).unwrap_or_default();
+                    row.iter().enumerate().fold([0.0; 2], |[sum, most], (at, value)| {
+                        [sum + value * sign(first + at), most + value.abs()]
                     })
                 };
-                let forces: Vec<[f64; 2]> = (0..c).map(force).collect();
-                let elastic = (0..self.elastic.len()).all(|mode| {
-                    let own = model.interface.own[mode][kind];
-                    let row = &self.motions[mode * self.stride..][..c];
-                    let start = [own * sign(first + mode), own.abs()];
-                    let expected = row.iter().zip(&forces).fold(start, |[sum, most], (b, f)| {
-                        [sum + b * f[0], most + b.abs() * f[1]]
-                    });
-                    agree(product[first + mode], expected)
+                let [damping, stiffness] = [sum(0), sum(1)];
+                [0, 1].map(|i| damping[i] * powers[1] + stiffness[i])
+            };
+            let elastic = (0..self.elastic.len()).all(|mode| {
+                let own = at(self.own[mode]);
+                let row = &self.motions[mode * self.stride..][..c];
+                let full = full(mode);
+                let start = [own * sign(first + mode) + full[0], own.abs() + full[1]];
+                let expected = row.iter().zip(&forces).fold(start, |[sum, most], (b, f)| {
+                    [sum + b * f[0], most + b.abs() * f[1]]
                 });
-                elastic
-                    && self.others.iter().enumerate().all(|(place, &other)| {
-                        agree(product[other], force(c + place))
-                    })
-            })
+                agree(product[first + mode], expected)
+            });
+            let others = self.others.iter().enumerate();
+            elastic && others.into_iter().all(|(place, &o)| agree(product[o], force(c + place)))
         })
     }
 }
 
 /// A sum of products, zero where it is but rounding.
-fn through<'a>(
-    factors: impl IntoIterator<Item = &'a f64>,
-    values: impl IntoIterator<Item = f64>,
-) -> f64 {
+fn through(factors: &[f64], values: &[f64]) -> f64 {
+    if values.iter().all(|value| *value == 0.0) {
+        return 0.0;
+    }
     let (mut sum, mut size) = (0.0_f64, 0.0);
-    for (factor, value) in factors.into_iter().zip(values) {
+    for (factor, value) in factors.iter().zip(values) {
         sum += factor * value;
         size += (factor * value).abs();
     }
@@ -296,19 +347,19 @@ fn largest(row: &[f64]) -> (usize, f64) {
     (row.iter().position(|value| value.abs() == most).unwrap_or(0), most)
 }
 
-/// A matrix and its transpose, each times signs in `range` and zeros elsewhere.
+/// Adds a matrix and its transpose, each times `factor` and signs in `range` and zeros elsewhere.
 fn times_signs(
     matrix: &Mat<f64>,
+    factor: f64,
     range: &Range<usize>,
     sign: impl Fn(usize) -> f64,
-) -> [Vec<f64>; 2] {
-    let signs: Vec<f64> = range.clone().map(&sign).collect();
-    let mut product = vec![0.0; matrix.nrows()];
-    let mut transposed = vec![0.0; matrix.ncols()];
+    [product, transposed]: &mut [Vec<f64>; 2],
+) {
+    let signs: Vec<f64> = range.clone().map(|at| factor * sign(at)).collect();
     for (column, transposed) in transposed.iter_mut().enumerate() {
         let values = matrix.col_as_slice(column);
         if range.contains(&column) {
-            let sign = sign(column);
+            let sign = signs[column - range.start];
             product.iter_mut().zip(values).for_each(|(sum, value)| *sum += sign * value);
         }
         // Four sums, so that one need not wait for another.
@@ -318,7 +369,6 @@ fn times_signs(
                 *sum += value * sign;
             }
         }
-        *transposed = sums.iter().sum();
+        *transposed += sums.iter().sum::<f64>();
     }
-    [product, transposed]
 }

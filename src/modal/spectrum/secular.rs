@@ -26,7 +26,7 @@ const APART: f64 = 1e-4;
 /// nearer to it each time.
 const CROWDED: f64 = 1e-3;
 /// Bound, in units of the modulus, above which a root becomes a node.
-const UNCERTAIN: f64 = 1e-11;
+const UNCERTAIN: f64 = 3e-11;
 /// Bound above which a disc proves nothing of use: in units of the modulus of the root …
 const LARGEST_BOUND: f64 = 1e-6;
 /// … or, for slow roots among fast ones, of the geometric mean of all moduli.

@@ -264,7 +264,7 @@ fn the_two_faster_instruction_sets_give_the_same_bits() {
     let case = model(&frequencies, 0.11, 0.3);
     let levels = Level::all();
     let solve =
-        |level: &Level| Spectrum::with(11, *level).solve(&nominal, &case).expect("certified");
+        |level: &Level| Spectrum::with(*level).solve(&nominal, &case).expect("certified");
     let found: Vec<_> = levels.iter().map(solve).collect();
     let fused = found.len() - 1;
     for pair in found[..fused].windows(2) {
