@@ -27,17 +27,34 @@ pub struct Solved<'a> {
     model: &'a Model,
     poles: &'a [c64],
     seen: Vec<Reference>,
+    /// Vectors known beforehand.
+    known: Vec<Pair>,
 }
 
 impl<'a> Solved<'a> {
     /// A model and all its poles.
     pub fn new(model: &'a Model, poles: &'a [c64]) -> Self {
-        Self { model, poles, seen: Vec::new() }
+        Self { model, poles, seen: Vec::new(), known: Vec::new() }
+    }
+
+    /// The model.
+    pub fn model(&self) -> &'a Model {
+        self.model
     }
 
     /// All poles.
     pub fn poles(&self) -> &'a [c64] {
         self.poles
+    }
+
+    /// Takes vectors of poles, so that they need not be found again.
+    pub fn offer(&mut self, pairs: impl IntoIterator<Item = Pair>) {
+        self.known.extend(pairs);
+    }
+
+    /// Whether a pole's vectors were offered.
+    pub fn has_offer(&self, pole: c64) -> bool {
+        self.known.iter().any(|pair| pair.pole == pole)
     }
 
     /// Whether the vectors of a pole are known.
@@ -49,7 +66,8 @@ impl<'a> Solved<'a> {
     pub fn reference(&mut self, solver: &mut Solver, pole: c64) -> &Reference {
         let known = self.seen.iter().position(|known| known.pair.pole == pole);
         let index = known.unwrap_or_else(|| {
-            let pair = solver.pair(self.model, pole);
+            let offered = self.known.iter().find(|pair| pair.pole == pole).cloned();
+            let pair = offered.unwrap_or_else(|| solver.pair(self.model, pole));
             self.seen.push(Reference::new(self.model, pair));
             self.seen.len() - 1
         });
@@ -183,7 +201,7 @@ impl Reference {
     }
 
     /// First guess of the same pole in `model`: the root nearest s₀ of `y₀ᴴ L(s) x₀ = 0`.
-    fn predict(&self, model: &Model) -> c64 {
+    pub fn predict(&self, model: &Model) -> c64 {
         let mut form = [c64::new(0.0, 0.0); 3];
         for (column, right) in self.pair.right.iter().enumerate() {
             let mut sums = [c64::new(0.0, 0.0); 3];
