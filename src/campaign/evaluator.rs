@@ -545,7 +545,7 @@ fn offer(
     let found = spectrum.vectors(model, &poles).into_iter();
     let pairs = found.map(|(pole, vectors)| solver.judge(model, pole, vectors));
     // Where the structure gives worse vectors than a whole factorisation would, that is used.
-    let allowed = model.coordinates() as f64 * f64::EPSILON;
+    let allowed = 0.1 * RESIDUAL_FACTOR * model.coordinates() as f64 * f64::EPSILON;
     solved.offer(pairs.filter(|pair| pair.residual <= allowed));
 }
 

@@ -414,8 +414,10 @@ fn vectors_of_the_reduced_form_are_those_of_the_whole_matrix() {
         assert_eq!(vectors.len(), poles.len());
         for (pole, vectors) in vectors {
             let pair = solver.judge(&case, pole, vectors);
-            assert!(pair.residual < 63.0 * f64::EPSILON, "{pole}: {:.1e}", pair.residual);
             let dense = solver.pair(&case, pole);
+            // Both see the error of the pole itself.
+            let allowed = 1.1 * dense.residual + 63.0 * f64::EPSILON;
+            assert!(pair.residual < allowed, "{pole}: {:.1e}", pair.residual);
             for (a, b) in [(&pair.right, &dense.right), (&pair.left, &dense.left)] {
                 let product: c64 = a.iter().zip(b).map(|(a, b)| a.conj() * b).sum();
                 assert!((product.norm() - 1.0).abs() < 1e-9, "{pole}: {}", product.norm());
