@@ -446,7 +446,7 @@ impl<'a> Evaluator<'a> {
         for mode in 0..at.labels.len() {
             if structured {
                 let guess = at.variants[variant].references[mode].predict(model);
-                offer_near(guess, &mut solved, spectrum, solver);
+                offer_near(guess, &mut solved, spectrum);
             }
             for (branch, found) in
                 self.identify(at, [variant, mode], &mut solved, solver, scratch)?
@@ -464,7 +464,7 @@ impl<'a> Evaluator<'a> {
         if self.all_poles {
             let named: Vec<Complex<f64>> = rows.iter().map(|row: &Pole| row.value).collect();
             if structured {
-                offer(poles.clone(), &mut solved, spectrum, solver);
+                offer(poles.clone(), &mut solved, spectrum);
             }
             for &pole in poles.iter().filter(|pole| !named.contains(pole)) {
                 rows.push(other_pole(plant, solved.reference(solver, pole)));
@@ -521,32 +521,17 @@ fn find_poles(
 const AT_ONCE: usize = 8;
 
 /// Finds the vectors of the poles nearest to a guess by the structure of the model, where it has one.
-fn offer_near(
-    guess: Complex<f64>,
-    solved: &mut Solved<'_>,
-    spectrum: &mut Spectrum,
-    solver: &mut Solver,
-) {
+fn offer_near(guess: Complex<f64>, solved: &mut Solved<'_>, spectrum: &mut Spectrum) {
     let mut near = solved.poles().to_vec();
     near.sort_by(|a, b| (a - guess).norm_sqr().total_cmp(&(b - guess).norm_sqr()));
     near.truncate(AT_ONCE);
-    offer(near, solved, spectrum, solver);
+    offer(near, solved, spectrum);
 }
 
 /// Finds the vectors of poles by the structure of the model, where it has one.
-fn offer(
-    mut poles: Vec<Complex<f64>>,
-    solved: &mut Solved<'_>,
-    spectrum: &mut Spectrum,
-    solver: &mut Solver,
-) {
+fn offer(mut poles: Vec<Complex<f64>>, solved: &mut Solved<'_>, spectrum: &mut Spectrum) {
     poles.retain(|pole| !solved.has_offer(*pole) && !solved.has_seen(*pole));
-    let model = solved.model();
-    let found = spectrum.vectors(model, &poles).into_iter();
-    let pairs = found.map(|(pole, vectors)| solver.judge(model, pole, vectors));
-    // Where the structure gives worse vectors than a whole factorisation would, that is used.
-    let allowed = 0.1 * RESIDUAL_FACTOR * model.coordinates() as f64 * f64::EPSILON;
-    solved.offer(pairs.filter(|pair| pair.residual <= allowed));
+    solved.offer(spectrum.vectors(solved.model(), &poles));
 }
 
 /// The other poles that are asked for the second-order change of one: the nearest, and the nearest that identity

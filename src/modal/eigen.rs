@@ -333,9 +333,9 @@ impl Solver {
     }
 
     /// The pair of vectors found elsewhere, `yᵀ L = 0`, judged as those of [`Solver::pair`] are.
-    pub fn judge(&mut self, model: &Model, pole: c64, [right, left]: [Vec<c64>; 2]) -> Pair {
+    pub fn judge(&mut self, model: &Model, pole: c64, [right, left]: &[Vec<c64>; 2]) -> Pair {
         self.weigh(model, pole);
-        let scaled = |vector: Vec<c64>, to: &mut Vec<c64>, scale: &[f64]| {
+        let scaled = |vector: &[c64], to: &mut Vec<c64>, scale: &[f64]| {
             to.clear();
             to.extend(vector.iter().zip(scale).map(|(z, scale)| z / *scale));
             let unit = norm(to).recip();

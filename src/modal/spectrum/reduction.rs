@@ -14,7 +14,7 @@ use std::ops::Range;
 /// Motions that are summed at once.
 pub const BLOCK: usize = 4;
 /// Most motions of a reduction; more would pay with many hundreds of modes alone.
-pub const MOST_MOTIONS: usize = 128;
+pub const MOST_MOTIONS: usize = 64;
 /// Operations per square of the elastic coordinates and pole of a full part, over 8/3: eight products.
 const FULL: f64 = 12.0;
 /// What is left of a motion, in parts of its largest element, that is of the others.

@@ -413,7 +413,7 @@ fn vectors_of_the_reduced_form_are_those_of_the_whole_matrix() {
         let vectors = spectrum.vectors(&case, &poles);
         assert_eq!(vectors.len(), poles.len());
         for (pole, vectors) in vectors {
-            let pair = solver.judge(&case, pole, vectors);
+            let pair = solver.judge(&case, pole, &vectors);
             let dense = solver.pair(&case, pole);
             // Both see the error of the pole itself.
             let allowed = 1.1 * dense.residual + 63.0 * f64::EPSILON;
