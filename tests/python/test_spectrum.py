@@ -1,5 +1,7 @@
 """Certified poles against poles in 50 digits; the two solvers against each other."""
 
+import shutil
+
 import mpmath
 import numpy as np
 import pandas as pd
@@ -20,10 +22,10 @@ def folder(tmp_path_factory):
     return folder
 
 
-def refined(matrices, pole, gap):
+def refined(entries, pole, gap):
     """The pole in many digits: root of the Rayleigh functional with vectors in double precision, whose errors enter
     by their product; and the size of that product."""
-    m, d, k = matrices
+    m, d, k = entries
     pencil = pole * pole * m + pole * d + k
     scale = 1 / np.sqrt(np.abs(np.diag(m)) * abs(pole) ** 2 + np.abs(np.diag(k)))
     u, _, vh = np.linalg.svd(scale[:, None] * pencil * scale)
@@ -39,6 +41,18 @@ def refined(matrices, pole, gap):
     return float(off), (1e-15 * abs(pole) / gap) ** 2 * gap
 
 
+def matrices(entries):
+    """M, D and K of the rows of `matrices.parquet` of one model."""
+    size = 1 + int(entries[entries["matrix"] == "K"]["row"].max())
+    found = []
+    for name in "MDK":
+        matrix = np.zeros((size, size))
+        one = entries[entries["matrix"] == name]
+        matrix[one["row"].astype(int), one["column"].astype(int)] = one["value"]
+        found.append(matrix)
+    return found
+
+
 def test_poles_are_within_their_bounds_of_poles_in_fifty_digits(folder):
     modes = pd.read_parquet(folder / "tables/modes.parquet")
     assert (modes["certificate"] == "discs").all() and (modes["solver"] == "structured").all()
@@ -51,19 +65,14 @@ def test_poles_are_within_their_bounds_of_poles_in_fifty_digits(folder):
         rows = modes[(modes["population"] == "dispersed") & (modes["case"] == case)]
         rows = rows[(rows["variant"] == variant) & (rows["flight_time_s"] == 105.0)]
         found = entries[(entries["variant"] == variant) & (entries["flight_time_s"] == 105.0)]
-        size = 1 + int(found[found["matrix"] == "K"]["row"].max())
-        matrices = []
-        for name in "MDK":
-            matrix = np.zeros((size, size))
-            one = found[found["matrix"] == name]
-            matrix[one["row"].astype(int), one["column"].astype(int)] = one["value"]
-            matrices.append(matrix)
+        m, d, k = matrices(found)
+        size = len(m)
         poles = rows["pole_re_rad_s"].to_numpy() + 1j * rows["pole_im_rad_s"].to_numpy()
         bounds = rows["pole_error_bound_rad_s"].to_numpy()
         assert len(poles) == size and (bounds < 1e-10 * np.abs(poles)).all()
         for index, pole in enumerate(poles):
             gap = np.abs(np.delete(poles, index) - pole).min()
-            off, uncertain = refined(matrices, pole, gap)
+            off, uncertain = refined((m, d, k), pole, gap)
             assert off <= bounds[index] + uncertain, (variant, pole, off, bounds[index])
             checked += 1
     assert checked >= 50
@@ -84,3 +93,67 @@ def test_both_solvers_find_the_same_poles(folder, tmp_path):
 
 def test_a_replay_uses_the_solver_of_the_run(folder):
     assert "bit for bit as stored" in tvse("replay", folder, "--case", 1)
+
+
+@pytest.fixture(scope="module")
+def many(tmp_path_factory):
+    """The reference vehicle with sixty modes at one time: elastic coordinates are eliminated in closed form."""
+    root = tmp_path_factory.mktemp("many")
+    shutil.copytree(ROOT / "vehicles/sls-like", root / "vehicle")
+    tvse("modes", root / "vehicle/stick.toml", "-o", root / "vehicle/modes", "--force", "--count", 60)
+    shutil.copy(ROOT / "dispersions/reference.toml", root / "reference.toml")
+    (root / "run.toml").write_text("""
+vehicle = "vehicle"
+dispersion = "reference.toml"
+cases = 8
+seed = 7
+flight_times_s = [105.0]
+modes = ["tvse"]
+gimballed = ["booster.*"]
+
+[[variant]]
+name = "no_jet_damping"
+case_jet_damping = false
+nozzle_jet_damping = "off"
+
+[[variant]]
+name = "jet_damping"
+case_jet_damping = true
+nozzle_jet_damping = "equation-13"
+""")
+    out = tvse("run", root / "run.toml", "--poles", "all", "--audit", 6, "--output", root / "run")
+    assert ": agreed" in out
+    return root
+
+
+def test_many_modes_are_proven_by_discs_and_with_the_full_jet_matrix_by_residuals(many):
+    modes = pd.read_parquet(many / "run/tables/modes.parquet")
+    assert (modes["solver"] == "structured").all()
+    proven = modes.groupby("variant")["certificate"].unique().map(list).to_dict()
+    assert proven == {"no_jet_damping": ["discs"], "jet_damping": ["residual"]}
+    tvse("replay", many / "run", "--case", 5, "--output", many / "replay")
+    entries = pd.read_parquet(many / "replay/matrices.parquet")
+    for variant in ["no_jet_damping", "jet_damping"]:
+        rows = modes[(modes["population"] == "dispersed") & (modes["case"] == 5) & (modes["variant"] == variant)]
+        poles = rows["pole_re_rad_s"].to_numpy() + 1j * rows["pole_im_rad_s"].to_numpy()
+        bounds = rows["pole_error_bound_rad_s"].to_numpy()
+        m, d, k = matrices(entries[entries["variant"] == variant])
+        assert len(poles) == len(m) == 64 and (bounds < 1e-10 * np.abs(poles)).all()
+        for index in range(0, 64, 3):
+            gap = np.abs(np.delete(poles, index) - poles[index]).min()
+            off, uncertain = refined((m, d, k), poles[index], gap)
+            assert off <= bounds[index] + uncertain, (variant, poles[index], off, bounds[index])
+        # Sum of the poles, which no other set of poles has.
+        trace = -np.trace(np.linalg.solve(m, d))
+        assert abs(2 * poles.real.sum() - trace) < 1e-11 * abs(trace)
+        # Participation adds up to one, with vectors from the structure.
+        parts = [c for c in rows.columns if c.startswith("participation_")]
+        assert np.abs(rows[parts].sum(axis=1) - 1).max() < 1e-8
+
+
+def test_many_modes_give_the_same_bytes_for_any_number_of_threads(many):
+    for jobs in (1, 2):
+        tvse("run", many / "run.toml", "--jobs", jobs, "--output", many / f"jobs{jobs}")
+    one, two = (many / f"jobs{jobs}/tables/modes.parquet" for jobs in (1, 2))
+    assert one.read_bytes() == two.read_bytes()
+    assert "bit for bit as stored" in tvse("replay", many / "jobs1", "--case", 3)

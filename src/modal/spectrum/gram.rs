@@ -2,6 +2,11 @@
 //!
 //! Where the motions come from is decided in `reduction`, what is done with G in `pencil`.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "closures and iterators do not inline into kernels of an instruction set"
+)]
+
 use super::lanes::{Complex, Complexes, Vector, WIDTH};
 use super::reduction::{BLOCK, Reduction};
 use super::scaled::Product;

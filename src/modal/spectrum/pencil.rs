@@ -5,6 +5,11 @@
 //! eliminated in closed form (`gram`): with y = Bη, `det L = Π e det [[I + GZ, Ga], [β, L]]` over the motions and the
 //! other coordinates. Determinants are those of `elimination`, roots are found in `secular`.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "closures and iterators do not inline into kernels of an instruction set"
+)]
+
 use super::elimination::{Determinants, Elimination};
 use super::gram::Gram;
 use super::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
@@ -842,8 +847,8 @@ fn condense<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) {
     } = pencil;
     let (n, others, stride) = (*size, order.len(), pencil.reduction.stride);
     let count = n - others;
-    // A sum of as many terms as there are modes, then one over motions; Z itself is a product of inverses.
-    let roundings = 16.0 + 2.0 * (pencil.reduction.elastic.len() as f64).sqrt();
+    // A sum of as many terms as there are modes, then one over motions; Z itself is known to as much only.
+    let roundings = 32.0 + 2.0 * (pencil.reduction.elastic.len() as f64).sqrt();
     for j in 0..n {
         let range = first[j]..first[j + 1];
         let degree = degree[j];

@@ -21,7 +21,7 @@ const FULL: f64 = 12.0;
 /// What is left of a motion, in parts of its largest element, that is of the others.
 const DEPENDENT: f64 = 1e-12;
 /// An element of Z, a or β, in parts of the terms of which it is the sum, that is rounding.
-const ROUNDING: f64 = 1e-14;
+const ROUNDING: f64 = 2e-15;
 /// Elastic coordinates below which a reduction saves less than it costs.
 const LEAST_MODES: usize = 32;
 /// Most coordinates of a model with a full part that are not reduced.
@@ -64,14 +64,16 @@ fn effort(modes: usize, motions: usize, others: usize) -> f64 {
 }
 
 impl Reduction {
-    /// Operations of a determinant of the model taken, over 8/3, and what a full part adds for each pole.
+    /// Operations of a determinant of the model taken, over 8/3, and what a full part adds for each pole; first-order
+    /// states, whose rows are sparse, do not count.
     pub fn effort(&self, model: &Model) -> f64 {
+        let n = model.second_order;
         if self.count == 0 {
-            return (model.second_order as f64).powi(3);
+            return (n as f64).powi(3);
         }
-        let modes = self.elastic.len() as f64;
-        let full = if self.is_full() { FULL * modes * modes } else { 0.0 };
-        effort(self.elastic.len(), self.count, self.others.len()) + full
+        let modes = self.elastic.len();
+        let full = if self.is_full() { FULL * (modes * modes) as f64 } else { 0.0 };
+        effort(modes, self.count, n - modes) + full
     }
 
     /// Whether the model has a part of no few motions.
@@ -97,7 +99,8 @@ impl Reduction {
         let elastic = self.elastic.clone();
         self.others.clear();
         self.others.extend((0..size).filter(|at| !elastic.contains(at)));
-        let whole = (size as f64).powi(3);
+        let n = model.second_order;
+        let whole = (n as f64).powi(3);
         self.gather(model);
         let modes = elastic.len();
         let full = known.full.iter().any(|full| !full.is_empty());
@@ -105,7 +108,7 @@ impl Reduction {
         // With a full part discs prove the poles of a whole matrix, residuals those of a reduced one: where the first is
         // at hand it is taken.
         let whole = if full > 0.0 && size <= MOST_WHOLE { 0.0 } else { whole };
-        let worth = |count: usize| effort(modes, count, size - modes) + full < 0.8 * whole;
+        let worth = |count: usize| effort(modes, count, n - modes) + full < 0.8 * whole;
         if !self.pivot(elastic.len(), worth) {
             return false;
         }
