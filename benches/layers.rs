@@ -111,7 +111,7 @@ fn layers(criterion: &mut Criterion) {
             b.iter(|| solver.poles(&model, &mut poles).expect("solved"));
         });
         if let Some(base) = Base::proven(nominal, &mut solver) {
-            let mut spectrum = Spectrum::new(model.coordinates());
+            let mut spectrum = Spectrum::new();
             group.bench_function(id("certified spectrum"), |b| {
                 b.iter(|| spectrum.solve(&base, &model).expect("certified"));
             });

@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let nominal = &evaluator.times[time].variants[variant].nominal;
                 let mut solver = Solver::new(view.model.coordinates());
                 let base = Base::of(nominal, &mut solver)?;
-                let mut spectrum = Spectrum::new(view.model.coordinates());
+                let mut spectrum = Spectrum::new();
                 let state = solver.state_matrix(view.model)?.clone();
                 let file = format!("{name}-{time}-{case}.f64");
                 let bytes: Vec<u8> = state.iter().flat_map(|v| v.to_le_bytes()).collect();

@@ -133,7 +133,7 @@ impl Buffers {
         let known = all.iter().position(|buffers| buffers.model.coordinates() == size);
         let index = known.unwrap_or_else(|| {
             let (model, scratch) = (Model::zeros(size), Model::zeros(size));
-            let (solver, spectrum) = (Solver::new(size), Spectrum::new(size));
+            let (solver, spectrum) = (Solver::new(size), Spectrum::new());
             all.push(Self { model, scratch, solver, spectrum, bounds: Vec::new() });
             all.len() - 1
         });

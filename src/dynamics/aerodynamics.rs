@@ -66,6 +66,9 @@ impl AerodynamicPlant {
             let at = (entry.row, entry.column);
             model.stiffness[at] -= pressure * entry.stiffness;
             model.damping[at] -= pressure * entry.damping;
+            let at = [entry.row, entry.column];
+            model.interface.add_full(0, at, -pressure * entry.damping);
+            model.interface.add_full(1, at, -pressure * entry.stiffness);
         }
         let (translation, rotation) = (layout.translation(), layout.rotation());
         if rotation.is_empty() {

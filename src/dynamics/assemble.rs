@@ -9,7 +9,7 @@ use super::drawn::DrawnVehicle;
 use super::engine::Attachment;
 use super::rigid_body::{self, Flow, Steady};
 use super::slosh::TankAttachment;
-use super::{Layout, Model, Servo};
+use super::{Layout, Model, Servo, interface};
 use crate::vehicle::MassProperties;
 use nalgebra::Vector3;
 
@@ -124,12 +124,6 @@ impl Plant {
     pub fn assemble(&self, drawn: &DrawnVehicle, effects: &Effects, model: &mut Model) {
         let layout = &self.layout;
         model.clear(layout.second_order());
-        for (mode, at) in layout.elastic().enumerate() {
-            let omega = drawn.body.frequency_rad_s[mode];
-            model.mass[(at, at)] = 1.0;
-            model.damping[(at, at)] = 2.0 * drawn.body.damping_ratio[mode] * omega;
-            model.stiffness[(at, at)] = omega * omega;
-        }
         rigid_body::add(&self.body, &drawn.body, layout, model);
         let acceleration = self.mean_acceleration(drawn, effects);
         for (index, (attachment, engine)) in self.attachments.iter().zip(&drawn.engines).enumerate()
@@ -154,6 +148,14 @@ impl Plant {
             servo.attach(&servo.compose(drawn), drawn, effects.feedback, layout, model);
         }
         let sensed = rigid_body::sensed(layout, &still, model);
+        let modes = drawn.body.frequency_rad_s.iter().zip(&drawn.body.damping_ratio);
+        let own = modes.map(|(omega, zeta)| [1.0, 2.0 * zeta * omega, omega * omega]);
+        interface::add_own(layout, own, model);
+        if effects.case_jet_damping {
+            for (attachment, engine) in self.attachments.iter().zip(&drawn.engines) {
+                attachment.add_case(effects.thrust * engine.mass_flow_kg_s, layout, model);
+            }
+        }
         let mut speed_m_s = None;
         if let (Some(plant), Some(air)) = (&self.aerodynamics, &drawn.aerodynamics) {
             plant.add(air, effects.aerodynamics, layout, model);

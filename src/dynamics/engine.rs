@@ -6,7 +6,7 @@
 use super::attached::Columns;
 use super::drawn::DrawnEngine;
 use super::gradient::{Attached, C, C3, Vectors, complex};
-use super::{Effects, Model, NozzleJet};
+use super::{Effects, Layout, Model, NozzleJet};
 use nalgebra::{Matrix3, Matrix3x2, Vector3};
 
 /// How one engine is attached to the body at one flight time.
@@ -46,6 +46,20 @@ impl Attachment {
         motion.add_thrust(self, engine, columns, effects, model);
         motion.add_jet(self, engine, columns, effects, model);
         motion.add_acceleration_stiffness(self, engine, columns, acceleration, model);
+        for motion in [&motion.gimbal, &motion.rotation] {
+            model.interface.add_motion(&motion[columns.rigid..columns.body]);
+        }
+    }
+
+    /// Adds the jet damping of the case (14) for a mass flow, kg/s, `−ṁ C` over the body coordinates.
+    pub fn add_case(&self, flow_kg_s: f64, layout: &Layout, model: &mut Model) {
+        let body = layout.body().end;
+        for (row, entries) in self.case_per_flow.chunks_exact(body).enumerate() {
+            for (column, entry) in entries.iter().enumerate() {
+                model.damping[(row, column)] -= flow_kg_s * entry;
+                model.interface.add_full(0, [row, column], -flow_kg_s * entry);
+            }
+        }
     }
 }
 
@@ -135,8 +149,7 @@ impl Motion {
         }
     }
 
-    /// Jet damping of the case (14) and of the nozzle: (13), or exactly
-    /// `∫ 2ṁ (Φ_g − x î× ρ)ᵀ î× ρ̇ dx` over the nozzle with ρ its rotation.
+    /// Jet damping of the nozzle: (13), or exactly `∫ 2ṁ (Φ_g − x î× ρ)ᵀ î× ρ̇ dx` over the nozzle with ρ its rotation.
     fn add_jet(
         &self,
         attachment: &Attachment,
@@ -147,13 +160,6 @@ impl Motion {
     ) {
         let flow = effects.thrust * engine.mass_flow_kg_s;
         let body = columns.body;
-        if effects.case_jet_damping && !attachment.case_per_flow.is_empty() {
-            for (row, entries) in attachment.case_per_flow.chunks_exact(body).enumerate() {
-                for (column, entry) in entries.iter().enumerate() {
-                    model.damping[(row, column)] -= flow * entry;
-                }
-            }
-        }
         if effects.nozzle_jet_damping == NozzleJet::Off {
             return;
         }

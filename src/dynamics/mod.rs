@@ -25,6 +25,7 @@ pub mod drawn;
 pub mod engine;
 pub mod gradient;
 pub mod interconnection;
+pub mod interface;
 pub mod jet_damping;
 pub mod layout;
 pub mod load_response;
@@ -43,6 +44,7 @@ pub use drawn::{
 };
 pub use engine::Attachment;
 pub use gradient::{Gradient, Vectors};
+pub use interface::Interface;
 pub use layout::{Layout, Part};
 pub use model::{Model, NullMotion};
 pub use servo::{Feedback, Servo};

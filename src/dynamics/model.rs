@@ -2,6 +2,7 @@
 //!
 //! It holds matrices; what they mean is decided in `assemble`, what follows from them in `modal`.
 
+use super::Interface;
 use faer::Mat;
 
 /// The matrices of one linear model in SI units, N×N each.
@@ -28,6 +29,8 @@ pub struct Model {
     /// Most poles at the origin that the equations may have beside the null states: integrators that
     /// nothing drives, rotations that nothing holds. Beyond these, a pole lost in the rounding is an error.
     pub at_origin: usize,
+    /// How the elastic coordinates are coupled, as far as it was said; the matrices hold it too.
+    pub interface: Interface,
 }
 
 /// See [`Model::null_motion`].
@@ -51,6 +54,7 @@ impl Model {
             null_states: Vec::new(),
             null_motion: None,
             at_origin: 0,
+            interface: Interface::default(),
         }
     }
 
@@ -81,6 +85,7 @@ impl Model {
         self.null_states.clear();
         self.null_motion = None;
         self.at_origin = 0;
+        self.interface.clear();
         for state in second_order..self.coordinates() {
             self.damping[(state, state)] = 1.0;
         }
@@ -109,6 +114,7 @@ impl Model {
             }
         }
         self.second_order = a.second_order;
+        self.interface.clear();
         self.null_states.clear();
         let motions = [&a.null_motion, &b.null_motion];
         self.null_motion = if motions[0] == motions[1] { motions[0].clone() } else { None };

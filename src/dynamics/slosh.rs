@@ -67,7 +67,12 @@ impl TankAttachment {
             }
         }
         columns.add_rotation_stiffness(&displacement, mass, acceleration, self.in_modes, model);
+        model.interface.add_motion(&displacement[columns.rigid..columns.body]);
+        if columns.rigid > 0 {
+            model.interface.add_motion(&self.slope[columns.rigid..columns.body]);
+        }
     }
+
     /// The part of the slosh mass in the form of [`super::gradient`], and its gradient with the mean
     /// acceleration held.
     pub fn form(

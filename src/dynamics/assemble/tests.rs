@@ -484,7 +484,7 @@ fn poles_under_thrust_off_the_centreline_in_the_air_are_those_of_the_whole_state
     }
     assert_vectors(&model, &mut solver, &poles);
     let base = Base::of(&model, &mut solver).expect("solved");
-    let certified = Spectrum::new(size).solve(&base, &model).expect("certified");
+    let certified = Spectrum::new().solve(&base, &model).expect("certified");
     assert_eq!(certified.len(), poles.len());
     for found in certified {
         let nearest = poles.iter().map(|s| (s - found.root).norm()).fold(f64::INFINITY, f64::min);

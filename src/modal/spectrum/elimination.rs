@@ -35,6 +35,12 @@ pub struct Elimination {
     probe: Vec<c64>,
     /// Moduli of a solution by column, of a transposed one by row, and of what the factors make of the first.
     moduli: [Vec<[f64; WIDTH]>; 3],
+    /// v = A⁻¹a by column and y = A⁻ᵀb by row: null vectors where A is singular.
+    pub right: Vec<Complexes>,
+    /// See [`Elimination::right`].
+    pub left: Vec<Complexes>,
+    /// |bᵀv|: near a singular matrix A⁻¹ is nearly v yᵀ over it.
+    pub across: [f64; WIDTH],
 }
 
 /// Determinants, and bounds of their relative errors.
@@ -107,22 +113,42 @@ fn modulus<V: Vector>(z: Complex<V>) -> V {
 }
 
 impl Elimination {
-    /// Room for matrices of `size` rows.
-    pub fn new(size: usize) -> Self {
-        let angle = |i: usize| (i as f64 + 1.0) * (i as f64 + 2.0) * 0.618_033_988_749_894_9;
+    /// Without room yet.
+    pub fn new() -> Self {
         Self {
-            size,
+            size: 0,
             sparse: 0,
-            matrix: vec![Complexes::ZERO; size * size],
-            doubt: vec![[0.0; WIDTH]; size * size],
-            structure: Pattern::new(size),
-            filled: Pattern::new(size),
-            rows: (0..size).collect(),
-            origin: vec![[0; WIDTH]; size],
-            column: vec![Complexes::ZERO; size],
-            listed: Vec::with_capacity(size),
-            probe: (0..size).map(|i| c64::new(angle(i).cos(), angle(i).sin())).collect(),
-            moduli: std::array::from_fn(|_| vec![[0.0; WIDTH]; size]),
+            matrix: Vec::new(),
+            doubt: Vec::new(),
+            structure: Pattern::new(0),
+            filled: Pattern::new(0),
+            rows: Vec::new(),
+            origin: Vec::new(),
+            column: Vec::new(),
+            listed: Vec::new(),
+            probe: Vec::new(),
+            moduli: Default::default(),
+            right: Vec::new(),
+            left: Vec::new(),
+            across: [0.0; WIDTH],
+        }
+    }
+
+    fn resize(&mut self, size: usize) {
+        let angle = |i: usize| (i as f64 + 1.0) * (i as f64 + 2.0) * 0.618_033_988_749_894_9;
+        self.size = size;
+        self.matrix.resize(size * size, Complexes::ZERO);
+        self.doubt.resize(size * size, [0.0; WIDTH]);
+        self.structure = Pattern::new(size);
+        self.filled = Pattern::new(size);
+        self.rows.resize(size, 0);
+        self.origin.resize(size, [0; WIDTH]);
+        self.probe = (0..size).map(|i| c64::new(angle(i).cos(), angle(i).sin())).collect();
+        for vector in [&mut self.column, &mut self.right, &mut self.left] {
+            vector.resize(size, Complexes::ZERO);
+        }
+        for moduli in &mut self.moduli {
+            moduli.resize(size, [0.0; WIDTH]);
         }
     }
 
@@ -132,8 +158,16 @@ impl Elimination {
         self.structure.next(row, first)
     }
 
-    /// Takes the structure: the number of sparse rows, and which elements are not zero.
-    pub fn shape(&mut self, sparse: usize, mut nonzero: impl FnMut(usize, usize) -> bool) {
+    /// Takes the structure: the numbers of rows and of sparse rows, and which elements are not zero.
+    pub fn shape(
+        &mut self,
+        size: usize,
+        sparse: usize,
+        mut nonzero: impl FnMut(usize, usize) -> bool,
+    ) {
+        if size != self.size {
+            self.resize(size);
+        }
         self.sparse = sparse;
         self.structure.bits.fill(0);
         for row in 0..self.size {
@@ -319,7 +353,7 @@ impl Elimination {
             }
             let size = |i: &usize| {
                 let value = &self.column[*i];
-                value.re[lane].hypot(value.im[lane])
+                value.re[lane] * value.re[lane] + value.im[lane] * value.im[lane]
             };
             let best = (j..n).max_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(j);
             if best == j {
@@ -410,6 +444,81 @@ impl Elimination {
         if dense { first } else { self.filled.next(row, first) }
     }
 
+    /// Solves with the factors: right sides by row of the matrix, solutions by column.
+    #[inline(always)]
+    pub fn solve<V: Vector>(&mut self, right_side: &[Complexes], to: &mut [Complexes]) {
+        let n = self.size;
+        for i in 0..n {
+            self.gather(i, right_side);
+            let row = self.rows[i];
+            let mut sum = Complex::<V>::load(&self.column[i]);
+            let mut k = self.next(i, row, 0);
+            while k < i {
+                let l = Complex::load(&self.matrix[row * n + k]);
+                sum = sum.subtract_product(l, Complex::load(&self.column[k]));
+                k = self.next(i, row, k + 1);
+            }
+            sum.store(&mut self.column[i]);
+        }
+        for k in (0..n).rev() {
+            let row = self.rows[k];
+            let mut sum = Complex::<V>::load(&self.column[k]);
+            let mut j = self.next(k, row, k + 1);
+            while j < n {
+                let u = Complex::<V>::load(&self.matrix[row * n + j]);
+                sum = sum.subtract_product(u, Complex::load(&to[j]));
+                j = self.next(k, row, j + 1);
+            }
+            sum.mul(Complex::load(&self.matrix[row * n + k])).store(&mut to[k]);
+        }
+    }
+
+    /// Solves with the transposed factors: right sides by column of the matrix, solutions by row.
+    #[inline(always)]
+    pub fn solve_transposed<V: Vector>(&mut self, right_side: &[Complexes], to: &mut [Complexes]) {
+        let n = self.size;
+        self.column.copy_from_slice(right_side);
+        for i in 0..n {
+            let row = self.rows[i];
+            let inverse = Complex::load(&self.matrix[row * n + i]);
+            let a = Complex::<V>::load(&self.column[i]).mul(inverse);
+            a.store(&mut self.column[i]);
+            let mut k = self.next(i, row, i + 1);
+            while k < n {
+                let u = Complex::load(&self.matrix[row * n + k]);
+                let value = Complex::<V>::load(&self.column[k]);
+                value.subtract_product(a, u).store(&mut self.column[k]);
+                k = self.next(i, row, k + 1);
+            }
+        }
+        for i in (0..n).rev() {
+            let row = self.rows[i];
+            let b = Complex::<V>::load(&self.column[i]);
+            let mut k = self.next(i, row, 0);
+            while k < i {
+                let l = Complex::load(&self.matrix[row * n + k]);
+                let value = Complex::<V>::load(&self.column[k]);
+                value.subtract_product(b, l).store(&mut self.column[k]);
+                k = self.next(i, row, k + 1);
+            }
+            for lane in 0..WIDTH {
+                let row = usize::from(self.origin[i][lane]);
+                to[row].re[lane] = self.column[i].re[lane];
+                to[row].im[lane] = self.column[i].im[lane];
+            }
+        }
+    }
+
+    /// Puts the right side of the row at a place there, lane by lane.
+    #[inline(always)]
+    fn gather(&mut self, place: usize, right_side: &[Complexes]) {
+        for lane in 0..WIDTH {
+            let from = &right_side[usize::from(self.origin[place][lane])];
+            self.column[place].re[lane] = from.re[lane];
+            self.column[place].im[lane] = from.im[lane];
+        }
+    }
+
     /// Bound of the relative error of the determinants by rounding.
     ///
     /// The factors are those of A + E, and `det(A + E)/det A − 1 = tr A⁻¹E` to first order. An element of E gathers
@@ -453,6 +562,7 @@ impl Elimination {
             let inverse = Complex::<V>::load(&self.matrix[row * n + k]);
             let v = sum.mul(inverse);
             v.store(&mut self.column[k]);
+            v.store(&mut self.right[k]);
             modulus(v).store(&mut self.moduli[0][k]);
             let own = modulus(v).mul(modulus(inverse.reciprocal()));
             own.add(weight).store(&mut self.moduli[2][k]);
@@ -505,7 +615,10 @@ impl Elimination {
             let mut stored = [0.0; WIDTH];
             size.store(&mut stored);
             for (lane, size) in stored.into_iter().enumerate() {
-                self.moduli[1][usize::from(self.origin[i][lane])][lane] = size;
+                let row = usize::from(self.origin[i][lane]);
+                self.moduli[1][row][lane] = size;
+                self.left[row].re[lane] = self.column[i].re[lane];
+                self.left[row].im[lane] = self.column[i].im[lane];
             }
         }
         let mut entered = V::splat(0.0);
@@ -521,7 +634,9 @@ impl Elimination {
         let unit = 0.5 * f64::EPSILON;
         let count = n as f64;
         let total = eliminated.mul_add(V::splat(2.0 * count.sqrt() + 8.0), entered);
-        let relative = total.mul(V::splat(SAFETY * unit)).div(across.square().sqrt());
+        let across = across.square().sqrt();
+        across.store(&mut self.across);
+        let relative = total.mul(V::splat(SAFETY * unit)).div(across);
         let mut error = [0.0; WIDTH];
         relative.add(V::splat(32.0 * count * unit)).store(&mut error);
         error

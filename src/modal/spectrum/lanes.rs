@@ -13,8 +13,16 @@
 /// Number of lanes.
 pub const WIDTH: usize = 8;
 
+/// Bits of the exponent of a number; those of 2⁵², whose last bits count units; what gives the reciprocal of a power
+/// of two.
+const EXPONENT_BITS: u64 = 0x7ff0_0000_0000_0000;
+const UNIT_BITS: u64 = 0x4330_0000_0000_0000;
+const RECIPROCAL_BITS: u64 = 0x7fe0_0000_0000_0000;
+/// 2⁵² and the bias of exponents.
+const BIAS: f64 = 4_503_599_627_370_496.0 + 1023.0;
+
 /// Eight complex numbers as they lie in memory.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[repr(C, align(64))]
 pub struct Complexes {
     /// Real parts.
@@ -54,6 +62,8 @@ pub trait Vector: Copy {
     fn sqrt(self) -> Self;
     /// `yes` where this is greater than `other`, else `no`.
     fn where_greater(self, other: Self, yes: Self, no: Self) -> Self;
+    /// Binary exponent of positive normal numbers below 2¹⁰²³, and the reciprocal of their power of two.
+    fn exponent(self) -> (Self, Self);
     /// Absolute value.
     #[inline(always)]
     fn abs(self) -> Self {
@@ -214,6 +224,13 @@ impl Vector for Portable {
         let of = |lane: usize| if self.0[lane] > other.0[lane] { yes.0[lane] } else { no.0[lane] };
         Self(std::array::from_fn(of))
     }
+    #[inline(always)]
+    fn exponent(self) -> (Self, Self) {
+        let bits = self.0.map(|value| value.to_bits() & EXPONENT_BITS);
+        let exponent = bits.map(|bits| f64::from_bits(bits >> 52 | UNIT_BITS) - BIAS);
+        let reciprocal = bits.map(|bits| f64::from_bits(RECIPROCAL_BITS.wrapping_sub(bits)));
+        (Self(exponent), Self(reciprocal))
+    }
 }
 
 /// An instruction set that this machine has.
@@ -283,7 +300,7 @@ impl Level {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Kernel, Vector, WIDTH};
+    use super::{BIAS, EXPONENT_BITS, Kernel, RECIPROCAL_BITS, UNIT_BITS, Vector, WIDTH};
     use std::arch::x86_64::*;
 
     /// # Safety
@@ -361,12 +378,28 @@ mod x86 {
             unsafe { Self(_mm256_sqrt_pd(self.0), _mm256_sqrt_pd(self.1)) }
         }
         #[inline(always)]
+        fn exponent(self) -> (Self, Self) {
+            let (low, high) = (exponent_of_four(self.0), exponent_of_four(self.1));
+            (Self(low.0, high.0), Self(low.1, high.1))
+        }
+        #[inline(always)]
         fn where_greater(self, other: Self, yes: Self, no: Self) -> Self {
             unsafe {
                 let low = _mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0);
                 let high = _mm256_cmp_pd::<_CMP_GT_OQ>(self.1, other.1);
                 Self(_mm256_blendv_pd(no.0, yes.0, low), _mm256_blendv_pd(no.1, yes.1, high))
             }
+        }
+    }
+
+    #[inline(always)]
+    fn exponent_of_four(value: __m256d) -> (__m256d, __m256d) {
+        unsafe {
+            let of = |bits: u64| _mm256_set1_epi64x(bits as i64);
+            let bits = _mm256_and_si256(_mm256_castpd_si256(value), of(EXPONENT_BITS));
+            let units = _mm256_or_si256(_mm256_srli_epi64::<52>(bits), of(UNIT_BITS));
+            let exponent = _mm256_sub_pd(_mm256_castsi256_pd(units), _mm256_set1_pd(BIAS));
+            (exponent, _mm256_castsi256_pd(_mm256_sub_epi64(of(RECIPROCAL_BITS), bits)))
         }
     }
 
@@ -414,6 +447,17 @@ mod x86 {
         #[inline(always)]
         fn sqrt(self) -> Self {
             unsafe { Self(_mm512_sqrt_pd(self.0)) }
+        }
+        #[inline(always)]
+        fn exponent(self) -> (Self, Self) {
+            unsafe {
+                let of = |bits: u64| _mm512_set1_epi64(bits as i64);
+                let bits = _mm512_and_si512(_mm512_castpd_si512(self.0), of(EXPONENT_BITS));
+                let units = _mm512_or_si512(_mm512_srli_epi64::<52>(bits), of(UNIT_BITS));
+                let exponent = _mm512_sub_pd(_mm512_castsi512_pd(units), _mm512_set1_pd(BIAS));
+                let reciprocal = _mm512_sub_epi64(of(RECIPROCAL_BITS), bits);
+                (Self(exponent), Self(_mm512_castsi512_pd(reciprocal)))
+            }
         }
         #[inline(always)]
         fn where_greater(self, other: Self, yes: Self, no: Self) -> Self {

@@ -5,26 +5,36 @@
 //! the dense solver, `eigen`.
 
 mod elimination;
+mod gram;
 pub mod lanes;
 mod pencil;
 mod predict;
+mod reduction;
+mod refine;
 mod scaled;
 mod secular;
 
 pub use predict::Base;
 pub use secular::{Bounded, Uncertain};
 
-use self::lanes::{Complexes, Level, WIDTH};
+use self::lanes::{Level, WIDTH};
 use self::pencil::Pencil;
+use self::reduction::Reduction;
+use self::refine::{Refined, pack};
+use self::scaled::Scaled;
 use self::secular::Secular;
 use super::{Solver, eigen};
 use crate::dynamics::Model;
 use faer::c64;
 
-/// Second-order coordinates beyond which elimination at every pole costs more than a dense solve.
-const MOST_COORDINATES: usize = 64;
+/// Second-order coordinates beyond which elimination of whole matrices at every pole costs more than a dense solve.
+const MOST_COORDINATES: f64 = 64.0;
 /// Rounds of evaluations before a spectrum is given up.
 const MOST_ROUNDS: usize = 6;
+/// Largest bound of a pole by its residual, relative: the bound itself is of first order.
+const LARGEST_BOUND: f64 = 1e-8;
+/// Error of the first-order change of a pole, relative.
+const TRACE: f64 = 1e-9;
 
 /// Buffers for models of one size.
 pub struct Spectrum {
@@ -32,7 +42,12 @@ pub struct Spectrum {
     pencil: Pencil,
     secular: Secular,
     guesses: Vec<c64>,
+    /// Determinants of a round with their errors.
+    values: Vec<(Scaled, f64)>,
     evaluations: usize,
+    /// Poles at work with a full part, and whether the last model had one.
+    group: Refined,
+    refined: bool,
 }
 
 impl Base {
@@ -50,31 +65,43 @@ impl Base {
     /// The base of `model`, where determinants pay and certify the model itself: a model too large, or whose poles
     /// are too sensitive for discs, would only cost determinants before the dense solver answers.
     pub fn proven(model: &Model, solver: &mut Solver) -> Option<Self> {
-        let size = model.coordinates();
-        let base = (model.second_order <= MOST_COORDINATES)
-            .then(|| Self::of(model, solver).ok())
-            .flatten()?;
-        Spectrum::new(size).solve(&base, model).is_ok().then_some(base)
+        let mut reduction = Reduction::default();
+        reduction.set(model);
+        // Determinants cost as many times their own effort as there are poles, the dense solve the cube of the poles.
+        let effort = if reduction.count > 0 { reduction.effort() } else { (model.second_order as f64).powi(3) };
+        let worth = effort <= MOST_COORDINATES * (model.second_order as f64).powi(2);
+        let base = worth.then(|| Self::of(model, solver).ok()).flatten()?;
+        Spectrum::new().solve(&base, model).is_ok().then_some(base)
+    }
+}
+
+impl Default for Spectrum {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
 impl Spectrum {
-    /// Buffers for models of `size` coordinates.
-    pub fn new(size: usize) -> Self {
-        Self::with(size, Level::best())
+    /// Buffers, with the fastest instruction set of this machine.
+    pub fn new() -> Self {
+        Self::with(Level::best())
     }
 
-    /// Buffers for models of `size` coordinates, with this instruction set.
-    pub fn with(size: usize, level: Level) -> Self {
+    /// Buffers, with this instruction set.
+    pub fn with(level: Level) -> Self {
         Self {
             level,
-            pencil: Pencil::new(size),
+            pencil: Pencil::new(),
             secular: Secular::default(),
             guesses: Vec::new(),
+            values: Vec::new(),
             evaluations: 0,
+            group: Refined::default(),
+            refined: false,
         }
     }
 
+    pub fn reduced(&self) -> [usize; 3] { let r = self.pencil.reduction(); [r.elastic.len(), r.count, r.others.len()] }
     /// Determinants evaluated for the last model.
     pub fn evaluations(&self) -> usize {
         self.evaluations
@@ -93,7 +120,7 @@ impl Spectrum {
         if !self.pencil.set(model) {
             return Err(Uncertain::NonFinite);
         }
-        base.predict(self.level, model, &mut self.guesses);
+        base.predict(self.level, model, self.pencil.reduction(), &mut self.guesses);
         if !self.guesses.iter().all(|s| s.re.is_finite() && s.im.is_finite()) {
             return Err(Uncertain::NonFinite);
         }
@@ -101,12 +128,15 @@ impl Spectrum {
         let typical = (logarithms / self.guesses.len() as f64).exp();
         self.pencil.equilibrate(if typical > 0.0 { typical } else { 1.0 });
         self.secular.start(self.guesses.iter().copied());
-        // Idle lanes of the first round, at least one, look beside the poles expected.
+        // Idle lanes of the first round, at least one, look beside the poles expected; one finds the leading
+        // coefficient, where it is not known.
+        let mut leading = self.pencil.leading();
+        let sought = usize::from(leading.is_none());
         let count = self.guesses.len();
-        let idle = WIDTH - count % WIDTH;
-        let beside: Vec<c64> = (0..idle.min(count))
+        let idle = (WIDTH - (count + sought) % WIDTH).min(count);
+        let beside: Vec<c64> = (0..idle)
             .map(|k| {
-                let s = self.guesses[(2 * k + 1) * count / (2 * idle.min(count))];
+                let s = self.guesses[(2 * k + 1) * count / (2 * idle)];
                 s + c64::new(0.03, 0.02 + 0.005 * k as f64) * s.norm()
             })
             .collect();
@@ -117,22 +147,25 @@ impl Spectrum {
             if round == 0 {
                 points.extend(&beside);
             }
+            if leading.is_none() {
+                points.push(c64::new(f64::INFINITY, 0.0));
+            }
             self.evaluations += points.len();
-            for (group, chunk) in points.chunks(WIDTH).enumerate() {
-                let mut packed = Complexes::ZERO;
-                for lane in 0..WIDTH {
-                    let s = chunk[lane.min(chunk.len() - 1)];
-                    (packed.re[lane], packed.im[lane]) = (s.re, s.im);
-                }
-                let values = self.pencil.evaluate(self.level, &packed);
-                for (lane, &point) in chunk.iter().enumerate() {
-                    let (value, error) = (values.value[lane], values.error[lane]);
-                    let index = group * WIDTH + lane;
-                    if index < nodes {
-                        self.secular.take(index, value, error);
-                    } else {
-                        elsewhere.push((point, value, error));
-                    }
+            self.values.clear();
+            for chunk in points.chunks(WIDTH) {
+                let found = self.pencil.evaluate(self.level, &pack(chunk));
+                let values = found.value.into_iter().zip(found.error);
+                self.values.extend(values.take(chunk.len()));
+            }
+            if leading.is_none() {
+                leading = self.values.pop();
+            }
+            let Some((highest, highest_error)) = leading else { return Err(Uncertain::NonFinite) };
+            for (index, &(value, error)) in self.values.iter().enumerate() {
+                let (value, error) = (value.over(highest), error + highest_error);
+                match points[index] {
+                    point if index >= nodes => elsewhere.push((point, value, error)),
+                    _ => self.secular.take(index, value, error),
                 }
             }
             self.secular.solve(self.level)?;
@@ -141,7 +174,52 @@ impl Spectrum {
             }
             self.secular.renew();
         }
-        self.secular.certify(elsewhere)
+        let found = self.secular.certify(elsewhere)?;
+        self.refined = self.pencil.reduction().is_full();
+        if self.refined { self.refine(&found) } else { Ok(found) }
+    }
+
+    /// The poles of the model with its full part, from those without it: each by its residual, and complete since their
+    /// discs do not meet and their sum is that of the first-order changes, which is that of all (a trace).
+    fn refine(&mut self, without: &[Bounded]) -> Result<Vec<Bounded>, Uncertain> {
+        if without.iter().any(|pole| pole.multiplicity > 1) {
+            return Err(Uncertain::Unresolved);
+        }
+        let mut found = Vec::with_capacity(without.len());
+        let (mut lacking, mut allowed) = (0.0, 0.0);
+        for group in without.chunks(WIDTH) {
+            let starts: Vec<c64> = group.iter().map(|pole| pole.root).collect();
+            self.group.find(self.level, &mut self.pencil, &pack(&starts));
+            for (lane, start) in group.iter().enumerate() {
+                let Refined { poles, bound, shift, .. } = &self.group;
+                let root = c64::new(poles.re[lane], poles.im[lane]);
+                let bound = bound[lane];
+                if !(bound <= LARGEST_BOUND * root.norm()) {
+                    return Err(Uncertain::Unresolved);
+                }
+                let times = if root.im == 0.0 { 1.0 } else { 2.0 };
+                lacking += times * (root.re - start.root.re - shift.re[lane]);
+                let size = shift.re[lane].hypot(shift.im[lane]);
+                allowed += times * (bound + start.bound + TRACE * size);
+                found.push(Bounded { root, bound, multiplicity: 1 });
+            }
+        }
+        found.sort_by(|a, b| a.root.im.total_cmp(&b.root.im).then(a.root.re.total_cmp(&b.root.re)));
+        let largest = found.iter().map(|pole| pole.bound).fold(0.0, f64::max);
+        for (index, a) in found.iter().enumerate() {
+            let near = found[index + 1..].iter();
+            let near = near.take_while(|b| b.root.im - a.root.im <= a.bound + largest);
+            let meets = |b: &Bounded| !((a.root - b.root).norm() > a.bound + b.bound);
+            if near.into_iter().any(meets) || (a.root.im != 0.0 && !(a.root.im > a.bound)) {
+                return Err(Uncertain::Unresolved);
+            }
+        }
+        if lacking.abs() <= allowed { Ok(found) } else { Err(Uncertain::Contradicted) }
+    }
+
+    /// Whether the last poles are known by their residuals, not by discs that hold all roots.
+    pub fn is_refined(&self) -> bool {
+        self.refined
     }
 }
 

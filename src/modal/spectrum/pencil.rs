@@ -1,24 +1,32 @@
 //! The determinant of `L(s) = M s² + D s + K` at eight frequencies at once.
 //!
 //! Poles at the origin that are known by construction are divided out column by column, exactly. First-order
-//! states come first: their rows are sparse. Determinants are those of `elimination`, roots are found in
-//! `secular`.
+//! states come first: their rows are sparse. Elastic coordinates that act through a few motions (`reduction`) are
+//! eliminated in closed form (`gram`): with y = Bη, `det L = Π e det [[I + GZ, Ga], [β, L]]` over the motions and the
+//! other coordinates. Determinants are those of `elimination`, roots are found in `secular`.
 
 use super::elimination::{Determinants, Elimination};
+use super::gram::Gram;
 use super::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
-use super::scaled::{self, Scaled};
+use super::reduction::{BLOCK, MOST_MOTIONS, Reduction};
+use super::scaled::{self, Product, Scaled};
 use crate::dynamics::Model;
 use faer::c64;
 
 /// A polynomial with the poles of a model as its roots.
 pub struct Pencil {
+    /// Coordinates of the matrix: others, then motions.
     size: usize,
-    /// Coefficients of s², s and 1 of every entry, row by row, the null states divided out.
+    reduction: Reduction,
+    gram: Gram,
+    /// Coefficients of s², s and 1 of every entry, row by row, the null states divided out; for motions [Z, a].
     entries: Vec<[f64; 3]>,
     /// Null states divided out of each column.
     degree: Vec<usize>,
-    /// The coordinate at each place.
+    /// The coordinate of the model at each place that is no motion.
     order: Vec<usize>,
+    /// Number of first-order states, the first places.
+    states: usize,
     /// Entries of first-order rows and columns that are not zero, for which the order is.
     nonzero: Vec<bool>,
     /// Determinant of the mass matrix, the leading coefficient.
@@ -26,6 +34,14 @@ pub struct Pencil {
     /// Bound of its relative error.
     leading_error: f64,
     elimination: Elimination,
+    /// Entries of motions that are not zero: the first of each column, their rows, and their values.
+    first: Vec<usize>,
+    rows: Vec<usize>,
+    values: Vec<Complexes>,
+    /// Places of all entries that are not zero, of a reduced model.
+    occupied: Vec<[usize; 2]>,
+    /// Forces on motions in the null vectors.
+    forces: [Vec<Complexes>; 2],
     /// Scales of rows and columns at the typical modulus.
     scale: [Vec<f64>; 2],
     /// Scales of rows and columns in each lane, powers of two.
@@ -37,83 +53,186 @@ pub struct Pencil {
 }
 
 impl Pencil {
-    /// A pencil for models of `size` coordinates.
-    pub fn new(size: usize) -> Self {
+    /// A pencil for models of any size.
+    pub fn new() -> Self {
         Self {
-            size,
-            entries: vec![[0.0; 3]; size * size],
-            degree: vec![0; size],
+            size: 0,
+            reduction: Reduction::default(),
+            gram: Gram::default(),
+            entries: Vec::new(),
+            degree: Vec::new(),
             order: Vec::new(),
+            states: 0,
             nonzero: Vec::new(),
             leading: Scaled::ONE,
             leading_error: 0.0,
-            elimination: Elimination::new(size),
-            scale: [vec![1.0; size], vec![1.0; size]],
-            largest: vec![0.0; size],
+            elimination: Elimination::new(),
+            first: Vec::new(),
+            rows: Vec::new(),
+            values: Vec::new(),
+            occupied: Vec::new(),
+            forces: [Vec::new(), Vec::new()],
+            scale: [Vec::new(), Vec::new()],
+            lanes: [Vec::new(), Vec::new()],
+            largest: Vec::new(),
             typical: 1.0,
-            lanes: [vec![[1.0; WIDTH]; size], vec![[1.0; WIDTH]; size]],
-            factor: vec![0.0; size * size],
+            factor: Vec::new(),
         }
+    }
+
+    /// How the model is reduced.
+    pub fn reduction(&self) -> &Reduction {
+        &self.reduction
     }
 
     /// Takes the entries of a model; false where it is not finite or its mass matrix is not positive
     /// definite.
     pub fn set(&mut self, model: &Model) -> bool {
-        let (size, n) = (self.size, model.second_order);
-        let states = size - n;
+        self.reduction.set(model);
+        let n = model.second_order;
+        let reduced = self.reduction.elastic.clone();
+        self.states = model.coordinates() - n;
         self.arrange(model);
+        self.order.retain(|at| !reduced.contains(at));
+        let others = self.order.len();
+        let size = others + self.reduction.count;
+        self.resize(size);
         for (column, &from) in self.order.iter().enumerate() {
             let null = |state| usize::from(model.null_states.contains(&state));
-            let degree = if from < n { null(from) + null(n + from) } else { 0 };
-            self.degree[column] = degree;
-            let [m, d, k] = [&model.mass, &model.damping, &model.stiffness]
-                .map(|matrix| matrix.col_as_slice(from));
-            let rows = self.entries.iter_mut().skip(column).step_by(size);
-            for (entry, &to) in rows.zip(&self.order) {
-                *entry = match degree {
-                    0 => [m[to], d[to], k[to]],
-                    1 => [m[to], d[to], 0.0],
-                    _ => [m[to], 0.0, 0.0],
-                };
+            self.degree[column] = if from < n { null(from) + null(n + from) } else { 0 };
+        }
+        self.degree[others..].fill(0);
+        self.fill(model);
+        for row in self.entries.chunks_exact_mut(size) {
+            for (entry, degree) in row.iter_mut().zip(&self.degree) {
+                let [m, d, _] = *entry;
+                match degree {
+                    0 => {}
+                    1 => *entry = [m, d, 0.0],
+                    _ => *entry = [m, 0.0, 0.0],
+                }
             }
         }
         // A motion at no cost: its columns add up to s² M v where it is a turn that goes on, and to
         // s (M v s + D v + M w) where it is a turn v with a velocity w.
         if let Some(motion) = &model.null_motion {
-            let place = |coordinate: usize| coordinate + states;
-            let (most, turned) = (place(motion.state % n), motion.state < n);
+            let place = |state: usize| self.order.iter().position(|at| *at == state % n);
+            let turned = motion.state < n;
+            let Some(most) = place(motion.state) else { return false };
             if self.degree[most] != 2 - usize::from(turned) {
                 return false;
             }
-            for row in self.entries.chunks_exact_mut(size) {
-                let [mut m, mut d, _] = row[most];
-                for &(state, ratio) in &motion.others {
-                    let other = row[place(state % n)];
+            for &(state, ratio) in &motion.others {
+                let Some(other) = place(state) else { return false };
+                for row in self.entries.chunks_exact_mut(size) {
+                    let [mut m, mut d, _] = row[most];
+                    let other = row[other];
                     match (turned, state < n) {
                         (true, true) => (m, d) = (m + ratio * other[0], d + ratio * other[1]),
                         (true, false) => d += ratio * other[0],
                         (false, _) => (m, d) = (m + ratio * other[0], 0.0),
                     }
+                    row[most] = [m, d, 0.0];
                 }
-                row[most] = [m, d, 0.0];
+            }
+            for row in self.entries.chunks_exact_mut(size) {
+                row[most][2] = 0.0;
             }
         }
         let entries = &self.entries;
-        self.elimination.shape(states, |row, column| entries[row * size + column] != [0.0; 3]);
-        self.entries.iter().flatten().all(|value| value.is_finite()) && self.lead(model)
+        let forced: Vec<bool> = (0..size)
+            .map(|column| (others..size).any(|row| entries[row * size + column] != [0.0; 3]))
+            .collect();
+        // Gimbals and the like see a few motions each.
+        let sparse = if self.reduction.count > 0 { others } else { self.states };
+        self.elimination.shape(size, sparse, |row, column| {
+            if row < others { entries[row * size + column] != [0.0; 3] } else { forced[column] || row == column }
+        });
+        if !self.entries.iter().flatten().all(|value| value.is_finite()) {
+            return false;
+        }
+        if self.reduction.count == 0 {
+            return self.lead(model);
+        }
+        self.gram.resize(&self.reduction);
+        self.list();
+        true
+    }
+
+    fn resize(&mut self, size: usize) {
+        self.size = size;
+        self.entries.clear();
+        self.entries.resize(size * size, [0.0; 3]);
+        self.degree.resize(size, 0);
+        self.largest.resize(size, 0.0);
+        for scale in &mut self.scale {
+            scale.clear();
+            scale.resize(size, 1.0);
+        }
+        for lanes in &mut self.lanes {
+            lanes.resize(size, [1.0; WIDTH]);
+        }
+    }
+
+    /// Entries of the model in the order of places.
+    fn fill(&mut self, model: &Model) {
+        let size = self.size;
+        let others = self.order.len();
+        if self.reduction.count == 0 {
+            for (column, &from) in self.order.iter().enumerate() {
+                let [m, d, k] = [&model.mass, &model.damping, &model.stiffness]
+                    .map(|matrix| matrix.col_as_slice(from));
+                let rows = self.entries.iter_mut().skip(column).step_by(size);
+                for (entry, &to) in rows.zip(&self.order) {
+                    *entry = [m[to], d[to], k[to]];
+                }
+            }
+            return;
+        }
+        let count = self.reduction.count;
+        let known = &self.reduction.others;
+        let of = |at: &usize| count + known.binary_search(at).unwrap_or_default();
+        let places: Vec<usize> = self.order.iter().map(of).chain(0..count).collect();
+        debug_assert_eq!(places.len(), others + count);
+        for (row, &to) in places.iter().enumerate() {
+            for (column, &from) in places.iter().enumerate() {
+                self.entries[row * size + column] = self.reduction.entries[to * size + from];
+            }
+        }
+    }
+
+    /// Lists the entries of motions that are not zero, and has the leading coefficient evaluated anew.
+    fn list(&mut self) {
+        let (size, others) = (self.size, self.order.len());
+        self.first.clear();
+        self.rows.clear();
+        for column in 0..size {
+            self.first.push(self.rows.len());
+            let nonzero = |row: &usize| self.entries[(others + row) * size + column] != [0.0; 3];
+            self.rows.extend((0..size - others).filter(nonzero));
+        }
+        self.first.push(self.rows.len());
+        self.values.resize(self.rows.len(), Complexes::ZERO);
+        let places = (0..size).flat_map(|i| (0..size).map(move |j| [i, j]));
+        self.occupied.clear();
+        self.occupied.extend(places.filter(|[i, j]| self.entries[i * size + j] != [0.0; 3]));
+        for forces in &mut self.forces {
+            forces.resize(self.reduction.count, Complexes::ZERO);
+        }
     }
 
     /// Puts the first-order states first, in an order in which eliminating them fills in little (Markowitz: the
     /// least product of what is left of row and column), as long as pivots are on the diagonal.
     fn arrange(&mut self, model: &Model) {
-        let (size, n) = (self.size, model.second_order);
+        let (size, n) = (model.coordinates(), model.second_order);
         let entry = |row: usize, column: usize| {
             let has = |matrix: &faer::Mat<f64>| matrix.col_as_slice(column)[row] != 0.0;
             row == column || has(&model.stiffness) || has(&model.damping)
         };
         let states = (n..size).flat_map(|state| (0..size).map(move |other| (state, other)));
         let both = || states.clone().flat_map(|(a, b)| [(a, b), (b, a)]);
-        let known = self.order.len() == size && self.nonzero.len() == 2 * (size - n) * size;
+        let known = self.order.len() + self.reduction.elastic.len() == size
+            && self.nonzero.len() == 2 * (size - n) * size;
         if known && both().zip(&self.nonzero).all(|((a, b), known)| entry(a, b) == *known) {
             return;
         }
@@ -156,6 +275,7 @@ impl Pencil {
     /// by at most `γ_{n+1} Σ|M⁻¹| ≤ γ_{n+1} n tr M⁻¹` (Higham, Accuracy and Stability, theorem 10.3).
     fn lead(&mut self, model: &Model) -> bool {
         let n = model.second_order;
+        self.factor.resize(n * n, 0.0);
         let factor = &mut self.factor[..n * n];
         let mut leading = Scaled::ONE;
         let mut unit = vec![0.0; n];
@@ -201,9 +321,10 @@ impl Pencil {
 
     /// Scales that bring the largest entries of rows and columns near one at frequencies of this modulus.
     pub fn equilibrate(&mut self, modulus: f64) {
-        let size = self.size;
+        let (size, others) = (self.size, self.order.len());
         let powers = powers_of(modulus);
         let [rows, columns] = &mut self.scale;
+        let (rows, columns) = (&mut rows[..others], &mut columns[..others]);
         for (i, (row, column)) in rows.iter_mut().zip(columns.iter_mut()).enumerate() {
             let [m, d, k] = self.entries[i * size + i].map(f64::abs);
             let of = powers[self.degree[i]];
@@ -215,7 +336,7 @@ impl Pencil {
         }
         for _ in 0..2 {
             self.largest.fill(0.0);
-            for (i, entries) in self.entries.chunks_exact(size).enumerate() {
+            for (i, entries) in self.entries.chunks_exact(size).take(others).enumerate() {
                 let mut most = 0.0_f64;
                 for (((entry, degree), column), largest) in
                     entries.iter().zip(&self.degree).zip(&*columns).zip(&mut self.largest)
@@ -240,14 +361,277 @@ impl Pencil {
         self.typical = modulus;
     }
 
-    /// The polynomial over its leading coefficient at eight frequencies, rad/s.
+    /// The determinants at eight frequencies, rad/s; at an infinite one the coefficient of the highest power, which is
+    /// evaluated so for reduced models alone.
     pub fn evaluate(&mut self, level: Level, points: &Complexes) -> Determinants {
-        let mut found = level.run(Evaluate { pencil: self, points });
-        for (value, error) in found.value.iter_mut().zip(&mut found.error) {
-            *value = value.over(self.leading);
-            *error += self.leading_error;
+        level.run(Evaluate { pencil: self, points })
+    }
+
+    /// The leading coefficient with the bound of its relative error, where it is known without evaluation.
+    pub fn leading(&self) -> Option<(Scaled, f64)> {
+        (self.reduction.count == 0).then_some((self.leading, self.leading_error))
+    }
+}
+
+/// Products and solutions of a reduced model; vectors are over the other places, then the elastic coordinates.
+impl Pencil {
+    /// Number of elements of a vector.
+    pub fn places(&self) -> usize {
+        self.order.len() + self.reduction.elastic.len()
+    }
+
+    /// Number of places of the matrix that is eliminated.
+    pub fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Factors the matrices at eight frequencies.
+    #[inline(always)]
+    pub fn factor<V: Vector>(&mut self, points: &Complexes) {
+        Evaluate { pencil: self, points }.run::<V>();
+    }
+
+    /// The null vectors that the factors gave.
+    #[inline(always)]
+    pub fn null_vectors<V: Vector>(&self, right: &mut [Complexes], left: &mut [Complexes]) {
+        let others = self.order.len();
+        for i in 0..others {
+            let (rows, columns) = (V::load(&self.lanes[0][i]), V::load(&self.lanes[1][i]));
+            Complex::<V>::load(&self.elimination.right[i]).scale(columns).store(&mut right[i]);
+            Complex::<V>::load(&self.elimination.left[i]).scale(rows).store(&mut left[i]);
         }
-        found
+        let minus = V::splat(-1.0);
+        let rows = self.reduction.motions.chunks_exact(self.reduction.stride);
+        for (mode, row) in rows.enumerate() {
+            let value = self.gram.elastic::<V>(row, mode, &self.forces[0]).scale(minus);
+            value.store(&mut right[others + mode]);
+            self.gram.elastic::<V>(row, mode, &self.forces[1]).store(&mut left[others + mode]);
+        }
+    }
+
+    /// What the motions see of the elastic coordinates.
+    #[inline(always)]
+    fn see<V: Vector>(&self, elastic: &[Complexes], weighted: bool, motions: &mut [Complexes]) {
+        let stride = self.reduction.stride;
+        for first in (0..motions.len()).step_by(BLOCK) {
+            let mut sums = [Complex::<V>::splat(0.0, 0.0); BLOCK];
+            let rows = self.reduction.motions.chunks_exact(stride);
+            for (mode, row) in rows.enumerate() {
+                let mut value = Complex::<V>::load(&elastic[mode]);
+                if weighted {
+                    value = value.mul(self.gram.weight::<V>(mode));
+                }
+                let row = &row[first..first + BLOCK];
+                for i in 0..BLOCK {
+                    sums[i] = sums[i].add_real_product(V::splat(row[i]), value);
+                }
+            }
+            for i in 0..BLOCK.min(motions.len() - first) {
+                sums[i].store(&mut motions[first + i]);
+            }
+        }
+    }
+
+    /// The matrix with these powers for s², s and 1, times a vector; with factors of the full damping and stiffness.
+    #[inline(always)]
+    pub fn apply<V: Vector>(
+        &self,
+        at: &Frequencies<V>,
+        full: Option<[Complex<V>; 2]>,
+        x: &[Complexes],
+        core: &mut [Complexes],
+        to: &mut [Complexes],
+    ) {
+        self.product::<V>(at, full, false, x, core, to);
+    }
+
+    /// The same with the transpose.
+    #[inline(always)]
+    pub fn apply_transposed<V: Vector>(
+        &self,
+        at: &Frequencies<V>,
+        full: Option<[Complex<V>; 2]>,
+        x: &[Complexes],
+        core: &mut [Complexes],
+        to: &mut [Complexes],
+    ) {
+        self.product::<V>(at, full, true, x, core, to);
+    }
+
+    #[inline(always)]
+    fn product<V: Vector>(
+        &self,
+        at: &Frequencies<V>,
+        full: Option<[Complex<V>; 2]>,
+        transposed: bool,
+        x: &[Complexes],
+        core: &mut [Complexes],
+        to: &mut [Complexes],
+    ) {
+        let others = self.order.len();
+        let (elastic, stride) = (&x[others..], self.reduction.stride);
+        self.see::<V>(elastic, false, &mut core[others..]);
+        // Sums over others gather in `to`, forces on motions beside.
+        let mut forces = [Complexes::ZERO; MOST_MOTIONS];
+        to[..others].fill(Complexes::ZERO);
+        core[..others].copy_from_slice(&x[..others]);
+        for &[row, column] in &self.occupied {
+            let entry = self.entries[row * self.size + column];
+            let value = value::<V>(entry, at.powers[0][self.degree[column]]);
+            let (from, into) = if transposed { (row, column) } else { (column, row) };
+            let sum = match into < others {
+                true => &mut to[into],
+                false => &mut forces[into - others],
+            };
+            Complex::<V>::load(sum).add(value.mul(Complex::load(&core[from]))).store(sum);
+        }
+        let forces = &forces[..self.reduction.count];
+        let rows = self.reduction.motions.chunks_exact(stride);
+        for (mode, row) in rows.enumerate() {
+            let own = value::<V>(self.reduction.own[mode], at.powers[0][0]);
+            let mut sum = own.mul(Complex::load(&elastic[mode]));
+            for i in 0..forces.len() {
+                sum = sum.add_real_product(V::splat(row[i]), Complex::load(&forces[i]));
+            }
+            sum.store(&mut to[others + mode]);
+        }
+        let Some(factors) = full else { return };
+        for kind in 0..2 {
+            let matrix = &self.reduction.full[kind][usize::from(transposed)];
+            if !matrix.is_empty() {
+                add_product::<V>(matrix, factors[kind], elastic, &mut to[others..]);
+            }
+        }
+    }
+
+    /// The solution with the factors, in place.
+    #[inline(always)]
+    pub fn solve<V: Vector>(&mut self, r: &mut [Complexes], core: &mut [Vec<Complexes>; 2]) {
+        let others = self.order.len();
+        let [right_side, solution] = core;
+        right_side[..others].copy_from_slice(&r[..others]);
+        self.see::<V>(&r[others..], true, &mut right_side[others..]);
+        for i in 0..self.size {
+            let value = Complex::<V>::load(&right_side[i]).scale(V::load(&self.lanes[0][i]));
+            value.store(&mut right_side[i]);
+        }
+        self.elimination.solve::<V>(right_side, solution);
+        // Forces on motions, with the entries as they were scaled by columns.
+        let mut forces = [Complexes::ZERO; MOST_MOTIONS];
+        for j in 0..self.size {
+            let value = Complex::<V>::load(&solution[j]);
+            for at in self.first[j]..self.first[j + 1] {
+                let sum = &mut forces[self.rows[at]];
+                let product = Complex::<V>::load(&self.values[at]).mul(value);
+                Complex::<V>::load(sum).add(product).store(sum);
+            }
+        }
+        for i in 0..others {
+            let value = Complex::<V>::load(&solution[i]).scale(V::load(&self.lanes[1][i]));
+            value.store(&mut r[i]);
+        }
+        self.substitute::<V>(&forces[..self.reduction.count], V::splat(-1.0), &mut r[others..]);
+    }
+
+    /// The solution with the transposed factors, in place; `at` are the powers they were made with.
+    #[inline(always)]
+    pub fn solve_transposed<V: Vector>(
+        &mut self,
+        at: &Frequencies<V>,
+        r: &mut [Complexes],
+        core: &mut [Vec<Complexes>; 2],
+    ) {
+        let others = self.order.len();
+        let [right_side, solution] = core;
+        let mut seen = [Complexes::ZERO; MOST_MOTIONS];
+        self.see::<V>(&r[others..], true, &mut seen[..self.reduction.count]);
+        right_side[..others].copy_from_slice(&r[..others]);
+        right_side[others..].fill(Complexes::ZERO);
+        for j in 0..self.size {
+            let mut sum = Complex::<V>::load(&right_side[j]);
+            for item in self.first[j]..self.first[j + 1] {
+                let row = self.rows[item];
+                let entry = self.entries[(others + row) * self.size + j];
+                let value = value::<V>(entry, at.powers[0][self.degree[j]]);
+                sum = sum.subtract_product(value, Complex::load(&seen[row]));
+            }
+            sum.scale(V::load(&self.lanes[1][j])).store(&mut right_side[j]);
+        }
+        self.elimination.solve_transposed::<V>(right_side, solution);
+        for i in 0..self.size {
+            let value = Complex::<V>::load(&solution[i]).scale(V::load(&self.lanes[0][i]));
+            value.store(if i < others { &mut r[i] } else { &mut seen[i - others] });
+        }
+        self.substitute::<V>(&seen[..self.reduction.count], V::splat(1.0), &mut r[others..]);
+    }
+
+    /// `(r + sign Bᵀ f)/e`, in place.
+    #[inline(always)]
+    fn substitute<V: Vector>(&self, forces: &[Complexes], sign: V, r: &mut [Complexes]) {
+        let rows = self.reduction.motions.chunks_exact(self.reduction.stride);
+        for (mode, row) in rows.enumerate() {
+            let force = self.gram.elastic::<V>(row, mode, forces).scale(sign);
+            let own = Complex::<V>::load(&r[mode]).mul(self.gram.weight::<V>(mode));
+            own.add(force).store(&mut r[mode]);
+        }
+    }
+
+    /// `Σ|y||r|`, and what rounding does to `yᵀ L x` in units of the unit roundoff.
+    #[inline(always)]
+    pub fn uncertainty<V: Vector>(
+        &self,
+        at: &Frequencies<V>,
+        right: &[Complexes],
+        left: &[Complexes],
+        residual: &[Complexes],
+    ) -> (Complex<V>, V) {
+        let others = self.order.len();
+        let modes = self.reduction.own.len() as f64;
+        let (mut first, mut size) = (V::splat(0.0), V::splat(0.0));
+        for i in 0..right.len() {
+            let own = match i.checked_sub(others) {
+                Some(mode) => modulus::<V>(self.reduction.own[mode], at.moduli[0][0]),
+                None => modulus::<V>(self.entries[i * self.size + i], at.moduli[0][self.degree[i]]),
+            };
+            let y = Complex::<V>::load(&left[i]).square().sqrt();
+            let x = Complex::<V>::load(&right[i]).square().sqrt();
+            first = y.mul_add(Complex::<V>::load(&residual[i]).square().sqrt(), first);
+            size = own.mul(y).mul_add(x, size);
+        }
+        // Own terms, the forces that balance them, and sums over motions and the full part.
+        let rounding = size.mul(V::splat(16.0 + 4.0 * modes.sqrt()));
+        (Complex { re: first, im: V::splat(0.0) }, rounding)
+    }
+}
+
+/// `to += factor · matrix · x` with a real square matrix, row by row.
+#[inline(always)]
+fn add_product<V: Vector>(matrix: &[f64], factor: Complex<V>, x: &[Complexes], to: &mut [Complexes]) {
+    let count = x.len();
+    for first in (0..count).step_by(BLOCK) {
+        let rows = (count - first).min(BLOCK);
+        let mut sums = [Complex::<V>::splat(0.0, 0.0); BLOCK];
+        // The last block takes the last row again and again.
+        let mut starts = [0; BLOCK];
+        for i in 0..BLOCK {
+            starts[i] = (first + i.min(rows - 1)) * count;
+        }
+        let lines = [
+            &matrix[starts[0]..starts[0] + count],
+            &matrix[starts[1]..starts[1] + count],
+            &matrix[starts[2]..starts[2] + count],
+            &matrix[starts[3]..starts[3] + count],
+        ];
+        for column in 0..count {
+            let value = Complex::<V>::load(&x[column]);
+            for i in 0..BLOCK {
+                sums[i] = sums[i].add_real_product(V::splat(lines[i][column]), value);
+            }
+        }
+        for i in 0..rows {
+            let sum = Complex::<V>::load(&to[first + i]).add(sums[i].mul(factor));
+            sum.store(&mut to[first + i]);
+        }
     }
 }
 
@@ -260,76 +644,242 @@ struct Evaluate<'a> {
     points: &'a Complexes,
 }
 
+/// Powers of s and of its modulus.
+#[derive(Clone, Copy)]
+pub struct Frequencies<V> {
+    /// In second-order rows, in first-order rows.
+    powers: [Powers<Complex<V>>; 2],
+    moduli: [Powers<V>; 2],
+    modulus: V,
+}
+
+impl<V: Vector> Frequencies<V> {
+    /// At infinity only the highest powers count: s² in second-order rows, s in first-order ones.
+    #[inline(always)]
+    pub fn new(points: &Complexes, typical: f64) -> Self {
+        let (zero, one, far) = (V::splat(0.0), V::splat(1.0), V::splat(f64::MAX));
+        let [zeros, ones] = [Complex { re: zero, im: zero }, Complex { re: one, im: zero }];
+        let s = Complex::<V>::load(points);
+        let infinite = s.re;
+        let s = Complex::where_greater(infinite, far, ones, s);
+        let square = s.square().max(V::splat(f64::MIN_POSITIVE));
+        let modulus = infinite.where_greater(far, V::splat(typical), square.sqrt());
+        let second = [(s.mul(s), square), (s, modulus), (ones, one), (zeros, zero), (zeros, zero)];
+        let mut found = Self {
+            powers: [[[zeros; 3]; 3]; 2],
+            moduli: [[[zero; 3]; 3]; 2],
+            modulus,
+        };
+        for degree in 0..3 {
+            for kind in 0..3 {
+                let (power, modulus) = second[degree + kind];
+                for row in 0..2 {
+                    let (highest, size) = if kind == row { (ones, one) } else { (zeros, zero) };
+                    found.powers[row][degree][kind] =
+                        Complex::where_greater(infinite, far, highest, power);
+                    found.moduli[row][degree][kind] = infinite.where_greater(far, size, modulus);
+                }
+            }
+        }
+        found
+    }
+
+    /// What the powers become when the polynomial is derived by s; moduli are left at zero.
+    #[inline(always)]
+    pub fn slope(s: Complex<V>) -> Self {
+        let zeros = Complex::splat(0.0, 0.0);
+        let ones = Complex::splat(1.0, 0.0);
+        let powers = [[s.add(s), ones, zeros], [ones, zeros, zeros], [zeros; 3]];
+        let none = V::splat(0.0);
+        Self { powers: [powers; 2], moduli: [[[none; 3]; 3]; 2], modulus: none }
+    }
+}
+
+#[inline(always)]
+fn value<V: Vector>(entry: [f64; 3], powers: [Complex<V>; 3]) -> Complex<V> {
+    let (m, d, k) = (V::splat(entry[0]), V::splat(entry[1]), V::splat(entry[2]));
+    let value = powers[2].scale(k).add_real_product(d, powers[1]);
+    value.add_real_product(m, powers[0])
+}
+
+#[inline(always)]
+fn modulus<V: Vector>(entry: [f64; 3], moduli: [V; 3]) -> V {
+    let (m, d, k) = (V::splat(entry[0].abs()), V::splat(entry[1].abs()), V::splat(entry[2].abs()));
+    m.mul_add(moduli[0], d.mul_add(moduli[1], k.mul(moduli[2])))
+}
+
 impl Kernel for Evaluate<'_> {
     type Output = Determinants;
 
     #[inline(always)]
     fn run<V: Vector>(self) -> Determinants {
         let pencil = self.pencil;
-        let n = pencil.size;
-        let s = Complex::<V>::load(self.points);
-        let (zero, one) = (V::splat(0.0), V::splat(1.0));
-        let square = s.square().max(V::splat(f64::MIN_POSITIVE));
-        let modulus = square.sqrt();
-        let [zeros, ones] = [zero, one].map(|re| Complex { re, im: zero });
-        let powers = [[s.mul(s), s, ones], [s, ones, zeros], [ones, zeros, zeros]];
-        let sizes = [[square, modulus, one], [modulus, one, zero], [one, zero, zero]];
-        let exponent = scale(pencil, &sizes);
-        let Pencil { entries, degree, elimination, lanes, .. } = pencil;
-        for i in 0..n {
-            let row_scale = V::load(&lanes[0][i]);
-            let mut j = elimination.element(i, 0);
+        let (n, others) = (pencil.size, pencil.order.len());
+        let at = Frequencies::<V>::new(self.points, pencil.typical);
+        let mut exponent = [0; WIDTH];
+        scale(pencil, &at, &mut exponent);
+        let product = match pencil.reduction.count == 0 {
+            true => Product::new(),
+            false => pencil.gram.form::<V>(&pencil.reduction, at.powers[0][0], at.moduli[0][0]),
+        };
+        scale_motions::<V>(pencil);
+        for i in 0..others {
+            let kind = usize::from(i < pencil.states);
+            let row_scale = V::load(&pencil.lanes[0][i]);
+            let mut j = pencil.elimination.element(i, 0);
             while j < n {
-                let [m, d, k] = entries[i * n + j].map(V::splat);
-                let factor = row_scale.mul(V::load(&lanes[1][j]));
-                let [square, linear, constant] = powers[degree[j]];
-                let value = constant.scale(k).add_real_product(d, linear);
-                let value = value.add_real_product(m, square).scale(factor);
-                value.store(&mut elimination.matrix[i * n + j]);
+                let entry = pencil.entries[i * n + j];
+                let factor = row_scale.mul(V::load(&pencil.lanes[1][j]));
+                let degree = pencil.degree[j];
+                let element = value::<V>(entry, at.powers[kind][degree]).scale(factor);
+                element.store(&mut pencil.elimination.matrix[i * n + j]);
                 // Each term of an element is rounded a few times.
-                let [square, linear, constant] = sizes[degree[j]];
-                let size = k.abs().mul(constant);
-                let size = m.abs().mul_add(square, d.abs().mul_add(linear, size));
-                size.mul(V::splat(4.0)).mul(factor).store(&mut elimination.doubt[i * n + j]);
-                j = elimination.element(i, j + 1);
+                let size = modulus::<V>(entry, at.moduli[kind][degree]).mul(factor);
+                size.mul(V::splat(4.0)).store(&mut pencil.elimination.doubt[i * n + j]);
+                j = pencil.elimination.element(i, j + 1);
             }
         }
-        let mut found = elimination.run::<V>();
-        for (value, exponent) in found.value.iter_mut().zip(exponent) {
-            *value = value.shifted(exponent);
+        if pencil.reduction.count == 0 {
+            let mut found = pencil.elimination.run::<V>();
+            for (value, exponent) in found.value.iter_mut().zip(exponent) {
+                *value = value.shifted(exponent);
+            }
+            return found;
+        }
+        condense(pencil, &at);
+        let product = product.finish();
+        let mut found = pencil.elimination.run::<V>();
+        let mut rounding = [0.0; WIDTH];
+        doubt::<V>(pencil).store(&mut rounding);
+        let count = pencil.reduction.elastic.len() as f64;
+        for lane in 0..WIDTH {
+            let value = found.value[lane].shifted(exponent[lane]);
+            let Scaled { mantissa, exponent } = product[lane];
+            found.value[lane] = value.times(mantissa).shifted(exponent);
+            found.error[lane] += 0.5 * f64::EPSILON * (rounding[lane] + 8.0 * count);
         }
         found
     }
 }
 
-/// Scales of each lane: those of the typical modulus, moved with the diagonal; powers of two. Gives the
-/// exponents that the determinants lack.
+/// Scales of each lane, powers of two: those of the typical modulus, moved with the diagonal. Takes the exponents that
+/// the determinants lack.
 #[inline(always)]
-fn scale<V: Vector>(pencil: &mut Pencil, sizes: &Powers<V>) -> [i64; WIDTH] {
-    let mut exponent = [0; WIDTH];
-    let ratio = sizes[0][1].mul(V::splat(1.0 / pencil.typical));
+fn scale<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>, exponent: &mut [i64; WIDTH]) {
+    let ratio = at.modulus.mul(V::splat(1.0 / pencil.typical));
     let lacking = [V::splat(1.0), ratio, ratio.mul(ratio)];
-    for i in 0..pencil.size {
+    for i in 0..pencil.order.len() {
         let degree = pencil.degree[i];
-        let terms = pencil.entries[i * pencil.size + i].map(f64::abs);
-        let typical = powers_of(pencil.typical)[degree];
-        let typical: f64 = terms.iter().zip(typical).map(|(term, power)| term * power).sum();
-        let [m, d, k] = terms.map(V::splat);
-        let [square, linear, constant] = sizes[degree];
-        let diagonal = m.mul_add(square, d.mul_add(linear, k.mul(constant)));
+        let entry = pencil.entries[i * pencil.size + i];
+        let [m, d, k] = powers_of(pencil.typical)[degree];
+        let typical = entry[0].abs() * m + entry[1].abs() * d + entry[2].abs() * k;
+        let kind = usize::from(i < pencil.states);
+        let diagonal = modulus::<V>(entry, at.moduli[kind][degree]);
         let moved = if typical > 0.0 { V::splat(typical).div(diagonal) } else { V::splat(1.0) };
         let row = moved.div(lacking[degree]).sqrt().mul(V::splat(pencil.scale[0][i]));
         let column = moved.mul(lacking[degree]).sqrt().mul(V::splat(pencil.scale[1][i]));
         for (side, value) in [row, column].into_iter().enumerate() {
             let to = &mut pencil.lanes[side][i];
             value.store(to);
-            for (value, exponent) in to.iter_mut().zip(&mut exponent) {
+            for (value, exponent) in to.iter_mut().zip(exponent.iter_mut()) {
                 *value = scaled::power_near(*value);
                 *exponent -= scaled::exponent(*value);
             }
         }
     }
-    exponent
+}
+
+/// Scales of motions: the roots of the diagonal of moduli of G, which cancel in the determinant.
+#[inline(always)]
+fn scale_motions<V: Vector>(pencil: &mut Pencil) {
+    let others = pencil.order.len();
+    for i in 0..pencil.reduction.count {
+        let mut root = [0.0; WIDTH];
+        V::load(&pencil.gram.sizes[i]).sqrt().store(&mut root);
+        let power = root.map(scaled::power_near);
+        pencil.lanes[1][others + i] = power;
+        pencil.lanes[0][others + i] = power.map(f64::recip);
+    }
+}
+
+/// Fills in the rows of motions, `[I + GZ, Ga]`.
+#[inline(always)]
+fn condense<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) {
+    let Pencil { size, gram, entries, degree, order, first, rows, values, lanes, elimination, .. } =
+        pencil;
+    let (n, others, stride) = (*size, order.len(), pencil.reduction.stride);
+    let count = n - others;
+    // A sum of as many terms as there are modes, then one over motions; Z itself is a product of inverses.
+    let roundings = 16.0 + 2.0 * (pencil.reduction.elastic.len() as f64).sqrt();
+    for j in 0..n {
+        let range = first[j]..first[j + 1];
+        let degree = degree[j];
+        let column_scale = V::load(&lanes[1][j]);
+        let mut size = V::splat(0.0);
+        for at_entry in range.clone() {
+            let row = rows[at_entry];
+            let entry = entries[(others + row) * n + j];
+            let element = value::<V>(entry, at.powers[0][degree]).scale(column_scale);
+            element.store(&mut values[at_entry]);
+            let modulus = modulus::<V>(entry, at.moduli[0][degree]).mul(column_scale);
+            size = modulus.mul_add(V::load(&gram.sizes[row]).sqrt(), size);
+        }
+        if range.is_empty() && j < others {
+            continue;
+        }
+        let size = size.mul(V::splat(roundings));
+        let (rows, values) = (&rows[range.clone()], &values[range]);
+        for block in (0..count).step_by(4) {
+            let mut sums = [Complex::<V>::splat(0.0, 0.0); 4];
+            for (row, value) in rows.iter().zip(values) {
+                let value = Complex::<V>::load(value);
+                for i in 0..4 {
+                    let g = Complex::<V>::load(&gram.elements[(block + i) * stride + row]);
+                    sums[i] = sums[i].add(g.mul(value));
+                }
+            }
+            for i in 0..(count - block).min(4) {
+                let to = others + block + i;
+                let row_scale = V::load(&lanes[0][to]);
+                let mut sum = sums[i].scale(row_scale);
+                if to == j {
+                    sum.re = sum.re.add(V::splat(1.0));
+                }
+                sum.store(&mut elimination.matrix[to * n + j]);
+                // The root of G's diagonal times the scale is less than two.
+                let root = V::load(&gram.sizes[block + i]).sqrt().mul(row_scale);
+                root.mul(size).store(&mut elimination.doubt[to * n + j]);
+            }
+        }
+    }
+}
+
+/// What rounding of the elastic coordinates' own equations may do to the determinant, in units of the unit roundoff:
+/// with the null vectors that elimination found.
+#[inline(always)]
+fn doubt<V: Vector>(pencil: &mut Pencil) -> V {
+    let Pencil { size, order, reduction, gram, first, rows, values, lanes, elimination, forces, .. } =
+        pencil;
+    let others = order.len();
+    let count = *size - others;
+    for forces in forces.iter_mut() {
+        forces.fill(Complexes::ZERO);
+    }
+    // Forces [Z, a] v of the right vector; the left one is of forces already.
+    for j in 0..*size {
+        let v = Complex::<V>::load(&elimination.right[j]);
+        for at in first[j]..first[j + 1] {
+            let to = &mut forces[0][rows[at]];
+            Complex::<V>::load(to).add(Complex::load(&values[at]).mul(v)).store(to);
+        }
+    }
+    for i in 0..count {
+        let row_scale = V::load(&lanes[0][others + i]);
+        let y = Complex::<V>::load(&elimination.left[others + i]);
+        y.scale(row_scale).store(&mut forces[1][i]);
+    }
+    let across = V::load(&elimination.across);
+    gram.rounding::<V>(&reduction.motions, &forces[0], &forces[1], across)
 }
 
 /// The powers at a modulus.

@@ -5,6 +5,7 @@
 
 use super::super::Pair;
 use super::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
+use super::reduction::{BLOCK, Reduction};
 use crate::dynamics::Model;
 use faer::c64;
 
@@ -40,11 +41,21 @@ impl Base {
         self.poles.iter().map(|pole| if pole.im == 0.0 { 1 } else { 2 }).sum()
     }
 
-    /// The poles expected in `model`, real ones real and the others above the axis.
-    pub fn predict(&self, level: Level, model: &Model, guesses: &mut Vec<c64>) {
+    /// The poles expected in `model`, real ones real and the others above the axis; by its reduction where there is
+    /// one.
+    pub fn predict(
+        &self,
+        level: Level,
+        model: &Model,
+        reduction: &Reduction,
+        guesses: &mut Vec<c64>,
+    ) {
         guesses.clear();
         for (vectors, poles) in self.groups.iter().zip(self.poles.chunks(WIDTH)) {
-            let forms = level.run(Forms { vectors, model });
+            let forms = match reduction.count {
+                0 => level.run(Forms { vectors, model }),
+                _ => level.run(Reduced { vectors, reduction }),
+            };
             for (lane, &pole) in poles.iter().enumerate() {
                 let [m, d, k] = forms.each_ref().map(|f| c64::new(f.re[lane], f.im[lane]));
                 guesses.push(guess(m, d, k, pole));
@@ -103,6 +114,72 @@ impl Kernel for Forms<'_> {
         let mut stored = [Complexes::ZERO; 3];
         for (to, form) in stored.iter_mut().zip(forms) {
             form.store(to);
+        }
+        stored
+    }
+}
+
+/// The same by the reduction of a model.
+struct Reduced<'a> {
+    vectors: &'a [[Complexes; 2]],
+    reduction: &'a Reduction,
+}
+
+impl Kernel for Reduced<'_> {
+    type Output = [Complexes; 3];
+
+    #[inline(always)]
+    fn run<V: Vector>(self) -> [Complexes; 3] {
+        let Reduction { elastic, others, count, stride, own, motions, entries, .. } = self.reduction;
+        let zero = Complex::<V>::splat(0.0, 0.0);
+        let mut forms = [zero; 3];
+        let elastic = &self.vectors[elastic.clone()];
+        for ([right, left], own) in elastic.iter().zip(own) {
+            let product = Complex::<V>::load(right).mul(Complex::load(left));
+            for kind in 0..3 {
+                forms[kind] = forms[kind].add_real_product(V::splat(own[kind]), product);
+            }
+        }
+        // The motions in both vectors, then the other coordinates.
+        let mut seen = vec![[Complexes::ZERO; 2]; count + others.len()];
+        for first in (0..*count).step_by(BLOCK) {
+            let mut sums = [[zero; 2]; BLOCK];
+            for (row, vectors) in motions.chunks_exact(*stride).zip(elastic) {
+                let (right, left) = (Complex::<V>::load(&vectors[0]), Complex::load(&vectors[1]));
+                let row = &row[first..first + BLOCK];
+                for i in 0..BLOCK {
+                    let part = V::splat(row[i]);
+                    sums[i][0] = sums[i][0].add_real_product(part, right);
+                    sums[i][1] = sums[i][1].add_real_product(part, left);
+                }
+            }
+            for i in 0..(count - first).min(BLOCK) {
+                sums[i][0].store(&mut seen[first + i][0]);
+                sums[i][1].store(&mut seen[first + i][1]);
+            }
+        }
+        for (seen, other) in seen[*count..].iter_mut().zip(others) {
+            *seen = self.vectors[*other];
+        }
+        for (row, entries) in entries.chunks_exact(seen.len()).enumerate() {
+            let mut sums = [zero; 3];
+            for ([right, _], entry) in seen.iter().zip(entries) {
+                if *entry == [0.0; 3] {
+                    continue;
+                }
+                let right = Complex::<V>::load(right);
+                for kind in 0..3 {
+                    sums[kind] = sums[kind].add_real_product(V::splat(entry[kind]), right);
+                }
+            }
+            let left = Complex::<V>::load(&seen[row][1]);
+            for kind in 0..3 {
+                forms[kind] = forms[kind].add(sums[kind].mul(left));
+            }
+        }
+        let mut stored = [Complexes::ZERO; 3];
+        for kind in 0..3 {
+            forms[kind].store(&mut stored[kind]);
         }
         stored
     }

@@ -75,7 +75,7 @@ impl Scaled {
 /// Eight products at once.
 pub struct Product<V> {
     value: Complex<V>,
-    exponent: [i64; WIDTH],
+    exponent: V,
     /// Factors since the exponents were last taken out.
     factors: u32,
 }
@@ -84,7 +84,7 @@ impl<V: Vector> Product<V> {
     /// Ones.
     #[inline(always)]
     pub fn new() -> Self {
-        Self { value: Complex::splat(1.0, 0.0), exponent: [0; WIDTH], factors: 0 }
+        Self { value: Complex::splat(1.0, 0.0), exponent: V::splat(0.0), factors: 0 }
     }
 
     /// Product with factors between 1e-30 and 1e30 in modulus.
@@ -97,18 +97,21 @@ impl<V: Vector> Product<V> {
         }
     }
 
+    /// Product with such real factors.
+    #[inline(always)]
+    pub fn times_real(&mut self, factor: V) {
+        self.value = self.value.scale(factor);
+        self.factors += 1;
+        if self.factors == 8 {
+            self.normalise();
+        }
+    }
+
     #[inline(always)]
     fn normalise(&mut self) {
-        let mut value = Complexes::ZERO;
-        self.value.store(&mut value);
-        let mut factor = [1.0; WIDTH];
-        for (lane, factor) in factor.iter_mut().enumerate() {
-            let size = value.re[lane].abs().max(value.im[lane].abs());
-            let power = exponent(size).clamp(-1000, 1000);
-            *factor = power_of_two(-power);
-            self.exponent[lane] += power;
-        }
-        self.value = self.value.scale(V::load(&factor));
+        let (exponent, reciprocal) = self.value.re.abs().max(self.value.im.abs()).exponent();
+        self.value = self.value.scale(reciprocal);
+        self.exponent = self.exponent.add(exponent);
         self.factors = 0;
     }
 
@@ -116,11 +119,12 @@ impl<V: Vector> Product<V> {
     #[inline(always)]
     pub fn finish(mut self) -> [Scaled; WIDTH] {
         self.normalise();
-        let mut value = Complexes::ZERO;
+        let (mut value, mut exponent) = (Complexes::ZERO, [0.0; WIDTH]);
         self.value.store(&mut value);
+        self.exponent.store(&mut exponent);
         std::array::from_fn(|lane| Scaled {
             mantissa: c64::new(value.re[lane], value.im[lane]),
-            exponent: self.exponent[lane],
+            exponent: exponent[lane] as i64,
         })
     }
 }

@@ -26,7 +26,7 @@ const APART: f64 = 1e-4;
 /// nearer to it each time.
 const CROWDED: f64 = 1e-3;
 /// Bound, in units of the modulus, above which a root becomes a node.
-const UNCERTAIN: f64 = 1e-11;
+const UNCERTAIN: f64 = 3e-11;
 /// Bound above which a disc proves nothing of use: in units of the modulus of the root …
 const LARGEST_BOUND: f64 = 1e-6;
 /// … or, for slow roots among fast ones, of the geometric mean of all moduli.
@@ -620,21 +620,28 @@ impl Kernel for Measure<'_> {
         let mut sum = Complex::<V>::splat(1.0, 0.0);
         let mut error = V::splat(0.0);
         let mut moduli = V::splat(1.0);
-        // Squares of moduli; the exponent is taken out now and then.
+        // Squares of moduli, the exponent of which is taken out now and then.
         let mut ratio = Product::<V>::new();
         for slot in 0..secular.node.len() {
             let (z, w, o) = (secular.node[slot], secular.weight[slot], secular.offset[slot]);
             let lane = secular.lane[slot];
             let a = one_in(lane, node.sub(Complex::splat(z.re, z.im)).add(h));
             let b = one_in(lane, a.sub(Complex::splat(o.re, o.im)));
-            let w =
-                Complex { re: zero_in(lane, V::splat(w.re)), im: zero_in(lane, V::splat(w.im)) };
-            let reciprocal = a.reciprocal();
-            sum = sum.add(w.mul(reciprocal));
-            let over = reciprocal.square().sqrt();
-            error = zero_in(lane, V::splat(secular.weight_error[slot])).mul_add(over, error);
-            moduli = w.square().sqrt().mul_add(over, moduli);
-            ratio.times(Complex { re: a.square().div(b.square()), im: V::splat(0.0) });
+            let size = (w.re * w.re + w.im * w.im).sqrt();
+            let (re, im) = (zero_in(lane, V::splat(w.re)), zero_in(lane, V::splat(w.im)));
+            let size = zero_in(lane, V::splat(size));
+            let doubt = zero_in(lane, V::splat(secular.weight_error[slot]));
+            // One division serves both reciprocals.
+            let (size_a, size_b) = (a.square(), b.square());
+            let inverse = V::splat(1.0).div(size_a.mul(size_b));
+            let (over_a, over_b) = (inverse.mul(size_b), inverse.mul(size_a));
+            let minus = V::splat(0.0).sub(over_a);
+            let reciprocal = Complex { re: a.re.mul(over_a), im: a.im.mul(minus) };
+            sum = sum.add(Complex { re, im }.mul(reciprocal));
+            let over = over_a.sqrt();
+            error = doubt.mul_add(over, error);
+            moduli = size.mul_add(over, moduli);
+            ratio.times_real(size_a.mul(over_b));
         }
         let ratio = ratio.finish();
         let rounding = (secular.node.len() as f64 + 16.0) * f64::EPSILON;

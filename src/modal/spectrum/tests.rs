@@ -52,7 +52,7 @@ fn the_poles_are_those_of_the_dense_solver_on_every_instruction_set() {
         frequencies.iter().enumerate().map(|(i, w)| w * (1.0 + 0.03 * (i as f64).cos())).collect();
     let case = model(&moved, 0.12, 0.25);
     for level in Level::all() {
-        let mut spectrum = Spectrum::with(14, level);
+        let mut spectrum = Spectrum::with(level);
         let found = spectrum.solve(&nominal, &case).expect("certified");
         check(&found, &case);
         for pole in &found {
@@ -102,7 +102,7 @@ fn roots(oscillators: &[(f64, f64)]) -> Vec<c64> {
 /// modulus.
 fn known_from(base_of: &[(f64, f64)], oscillators: &[(f64, f64)]) -> f64 {
     let nominal = base(&known(base_of));
-    let mut spectrum = Spectrum::new(oscillators.len());
+    let mut spectrum = Spectrum::new();
     let found = spectrum.solve(&nominal, &known(oscillators)).expect("certified");
     let mut exact = roots(oscillators);
     assert_eq!(found.len(), exact.len());
@@ -143,7 +143,7 @@ fn modes_that_nothing_couples_to_are_their_own_poles() {
     uncouple(&mut nominal);
     let mut case = model(&[1.02, 1.5, 2.4, 3.1], 0.1, 0.25);
     uncouple(&mut case);
-    let found = Spectrum::new(6).solve(&base(&nominal), &case).expect("certified");
+    let found = Spectrum::new().solve(&base(&nominal), &case).expect("certified");
     check(&found, &case);
     let own = c64::new(-0.005 * 1.5, 1.5 * (1.0_f64 - 0.005 * 0.005).sqrt());
     assert!(found.iter().any(|pole| (pole.root - own).norm() <= pole.bound + 1e-15));
@@ -154,7 +154,7 @@ fn repeated_poles_are_certified_as_a_cluster_with_their_multiplicity() {
     let nominal: Vec<(f64, f64)> = [1.0, 4.0, 4.0, 9.0, 16.0].map(|k| (0.0625, k)).into();
     let repeated: Vec<(f64, f64)> = [1.25, 4.5, 4.5, 4.5, 16.0].map(|k| (0.0625, k)).into();
     for oscillators in [&nominal, &repeated] {
-        let found = Spectrum::new(5)
+        let found = Spectrum::new()
             .solve(&base(&known(&nominal)), &known(oscillators))
             .expect("certified");
         let exact = roots(oscillators);
@@ -209,7 +209,7 @@ fn poles_at_the_origin_known_by_construction_are_divided_out() {
         model
     };
     let case = free(9.5);
-    let found = Spectrum::new(3).solve(&base(&free(9.0)), &case).expect("certified");
+    let found = Spectrum::new().solve(&base(&free(9.0)), &case).expect("certified");
     assert_eq!(found.len(), 2);
     check(&found, &case);
 }
@@ -218,7 +218,7 @@ fn poles_at_the_origin_known_by_construction_are_divided_out() {
 fn overflow_and_numbers_that_are_not_finite_are_never_certified() {
     let nominal = model(&[1.0, 2.0, 3.0], 0.1, 0.2);
     let nominal_base = base(&nominal);
-    let mut spectrum = Spectrum::new(5);
+    let mut spectrum = Spectrum::new();
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
         for at in [(0, 1), (2, 2), (4, 0)] {
             let mut case = nominal.clone();
@@ -264,7 +264,7 @@ fn the_two_faster_instruction_sets_give_the_same_bits() {
     let case = model(&frequencies, 0.11, 0.3);
     let levels = Level::all();
     let solve =
-        |level: &Level| Spectrum::with(11, *level).solve(&nominal, &case).expect("certified");
+        |level: &Level| Spectrum::with(*level).solve(&nominal, &case).expect("certified");
     let found: Vec<_> = levels.iter().map(solve).collect();
     let fused = found.len() - 1;
     for pair in found[..fused].windows(2) {

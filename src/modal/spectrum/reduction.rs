@@ -1,0 +1,374 @@
+//! From a model to its interface: elastic coordinates with equations of their own, seen by the rest through a few
+//! motions.
+//!
+//! With the elastic block `diag(e) + Bᵀ Z B` and its coupling `Bᵀ a` and `β B` to the other coordinates, what the
+//! elastic coordinates do to the rest passes through `G = B diag(e)⁻¹ Bᵀ`; determinants of what is left are those of
+//! `pencil`. Which motions B there may be says `dynamics::Interface`; which of them are independent, and Z, a and β, are
+//! found in the matrices of the model themselves, and a product with a vector of signs proves that nothing is left out.
+
+use crate::dynamics::Model;
+use faer::Mat;
+use nalgebra::DMatrix;
+use std::ops::Range;
+
+/// Motions that are summed at once.
+pub const BLOCK: usize = 4;
+/// Most motions of a reduction; more would pay with many hundreds of modes alone.
+pub const MOST_MOTIONS: usize = 128;
+/// What is left of a motion, in parts of its largest element, that is of the others.
+const DEPENDENT: f64 = 1e-12;
+/// An element of Z, a or β, in parts of the terms of which it is the sum, that is rounding.
+const ROUNDING: f64 = 1e-14;
+/// Largest part of the terms of a product that may be left out: rounding of the terms.
+const LEFT_OUT: f64 = 1e-12;
+
+/// The interface of one model.
+#[derive(Debug, Default)]
+pub struct Reduction {
+    /// The elastic coordinates that are reduced; none where there is no interface worth it.
+    pub elastic: Range<usize>,
+    /// The other coordinates, ascending.
+    pub others: Vec<usize>,
+    /// Number of motions.
+    pub count: usize,
+    /// Mass, damping and stiffness of each elastic coordinate by itself.
+    pub own: Vec<[f64; 3]>,
+    /// The motions B: a row per elastic coordinate, ended by zeros to a length of `stride`.
+    pub motions: Vec<f64>,
+    /// Number of motions, rounded up to whole blocks.
+    pub stride: usize,
+    /// Mass, damping and stiffness `[[Z, a], [β, L]]` over the motions, then the other coordinates, row by row.
+    pub entries: Vec<[f64; 3]>,
+    /// What is of no few motions, less its diagonal, which is in `own`: damping and stiffness, and their transposes, square
+    /// and row by row; empty where there is none.
+    pub full: [[Vec<f64>; 2]; 2],
+    /// Rows that may be motions; then what elimination leaves of them.
+    candidates: Vec<f64>,
+    left: Vec<f64>,
+    /// Row and column of each pivot.
+    pivots: Vec<[usize; 2]>,
+}
+
+/// Operations per frequency, over 8/3: the cube of the size of a whole matrix that would cost as much.
+fn effort(modes: usize, motions: usize, others: usize) -> f64 {
+    let [k, c, o] = [modes, motions, others].map(|count| count as f64);
+    let size = c + o;
+    size.powi(3) + 0.375 * (2.0 * k * c * c + 16.0 * k * c + 8.0 * c * size * size.min(10.0))
+}
+
+impl Reduction {
+    /// Operations of a determinant, over 8/3.
+    pub fn effort(&self) -> f64 {
+        effort(self.elastic.len(), self.count, self.others.len())
+    }
+
+    /// Whether the model has a part of no few motions.
+    pub fn is_full(&self) -> bool {
+        self.count > 0 && self.full.iter().any(|[plain, _]| !plain.is_empty())
+    }
+
+    /// Takes a model: its interface, or no elastic coordinates where there is none, or none that pays.
+    pub fn set(&mut self, model: &Model) {
+        let size = model.coordinates();
+        self.elastic = model.interface.elastic.clone();
+        if self.elastic.is_empty() || !self.find(model) {
+            self.elastic = 0..0;
+            self.count = 0;
+            self.others.clear();
+            self.others.extend(0..size);
+        }
+    }
+
+    fn find(&mut self, model: &Model) -> bool {
+        let known = &model.interface;
+        let size = model.coordinates();
+        let elastic = self.elastic.clone();
+        self.others.clear();
+        self.others.extend((0..size).filter(|at| !elastic.contains(at)));
+        let whole = (size as f64).powi(3);
+        self.gather(model);
+        let worth = |count: usize| {
+            effort(elastic.len(), count, size - elastic.len()) < 0.8 * whole
+        };
+        if !self.pivot(elastic.len(), worth) {
+            return false;
+        }
+        self.own.clear();
+        self.own.extend(&known.own);
+        for (kind, full) in known.full.iter().enumerate() {
+            let count = elastic.len();
+            let [plain, transposed] = &mut self.full[kind];
+            plain.clone_from(full);
+            transposed.clear();
+            if full.is_empty() {
+                continue;
+            }
+            for (mode, own) in self.own.iter_mut().enumerate() {
+                own[kind + 1] += std::mem::take(&mut plain[mode * count + mode]);
+            }
+            transposed.resize(count * count, 0.0);
+            for (row, values) in plain.chunks_exact(count).enumerate() {
+                for (column, value) in values.iter().enumerate() {
+                    transposed[column * count + row] = *value;
+                }
+            }
+        }
+        self.reduce(model) && self.complete(model)
+    }
+
+    /// Rows that may be motions: those known, and what other coordinates see that are not attached to the body.
+    fn gather(&mut self, model: &Model) {
+        let known = &model.interface;
+        let (count, n) = (self.elastic.len(), model.second_order);
+        self.candidates.clear();
+        // Of a translation or rotation, components that are the rounding of the others are none.
+        for axes in known.motions.chunks_exact(3 * count) {
+            let least = DEPENDENT * largest(axes).1;
+            let rows = axes.chunks_exact(count).filter(|row| largest(row).1 > least);
+            rows.for_each(|row| self.candidates.extend(row));
+        }
+        let apart = self.others.iter().filter(|at| **at < self.elastic.start || **at >= n);
+        let matrices = [&model.mass, &model.damping, &model.stiffness];
+        for &at in apart {
+            for matrix in matrices {
+                let row = self.elastic.clone().map(|mode| matrix[(at, mode)]);
+                if row.clone().any(|value| value != 0.0) {
+                    self.candidates.extend(row);
+                }
+                let column = &matrix.col_as_slice(at)[self.elastic.clone()];
+                if column.iter().any(|value| *value != 0.0) {
+                    self.candidates.extend(column);
+                }
+            }
+        }
+    }
+
+    /// Picks independent rows of the candidates, and an elastic coordinate for each: Gaussian elimination with complete
+    /// pivoting of rows scaled alike. False as soon as there are too many.
+    fn pivot(&mut self, modes: usize, worth: impl Fn(usize) -> bool) -> bool {
+        self.left.clear();
+        self.left.extend(&self.candidates);
+        self.pivots.clear();
+        let rows = self.left.len() / modes;
+        // Largest element left of each row, and its place.
+        let mut most = Vec::with_capacity(rows);
+        for row in self.left.chunks_exact_mut(modes) {
+            let largest = largest(row).1.recip();
+            row.iter_mut().for_each(|value| *value *= largest);
+            most.push(self::largest(row));
+        }
+        let mut open: Vec<usize> = (0..rows).collect();
+        let mut pivot_row = vec![0.0; modes];
+        while let Some((at, &row)) =
+            open.iter().enumerate().max_by(|(_, a), (_, b)| most[**a].1.total_cmp(&most[**b].1))
+        {
+            let (column, size) = most[row];
+            if !(size > DEPENDENT) {
+                break;
+            }
+            if self.pivots.len() == MOST_MOTIONS || !worth(self.pivots.len() + 1) {
+                return false;
+            }
+            open.remove(at);
+            self.pivots.push([row, column]);
+            pivot_row.copy_from_slice(&self.left[row * modes..][..modes]);
+            for &other in &open {
+                let values = &mut self.left[other * modes..][..modes];
+                let factor = values[column] / pivot_row[column];
+                if factor == 0.0 {
+                    continue;
+                }
+                for (value, pivot) in values.iter_mut().zip(&pivot_row) {
+                    *value -= factor * pivot;
+                }
+                values[column] = 0.0;
+                most[other] = largest(values);
+            }
+        }
+        self.pivots.sort_unstable();
+        self.count = self.pivots.len();
+        self.count > 0
+    }
+
+    /// B, and Z, a and β by the elements of the model at the pivots.
+    fn reduce(&mut self, model: &Model) -> bool {
+        let (modes, c, first) = (self.elastic.len(), self.count, self.elastic.start);
+        let size = c + self.others.len();
+        let columns: Vec<usize> = self.pivots.iter().map(|[_, column]| first + column).collect();
+        let at_pivots = DMatrix::from_fn(c, c, |i, j| {
+            self.candidates[self.pivots[i][0] * modes + self.pivots[j][1]]
+        });
+        let Some(inverse) = at_pivots.try_inverse() else { return false };
+        let moduli = inverse.abs();
+        let (mut row, mut column) = (Vec::with_capacity(c), Vec::with_capacity(c));
+        self.entries.clear();
+        self.entries.resize(size * size, [0.0; 3]);
+        let matrices = [&model.mass, &model.damping, &model.stiffness];
+        for (kind, matrix) in matrices.into_iter().enumerate() {
+            let between = DMatrix::from_fn(c, c, |i, j| match i == j {
+                true => model.interface.attached[columns[i] - first][kind],
+                false => matrix[(columns[i], columns[j])] - self.full_at(kind, columns[i], columns[j]),
+            });
+            if between.iter().any(|value| *value != 0.0) {
+                let sizes = moduli.tr_mul(&between.abs()) * &moduli;
+                let between = inverse.tr_mul(&between) * &inverse;
+                for (index, (value, size_of)) in between.iter().zip(&sizes).enumerate() {
+                    if value.abs() > ROUNDING * size_of {
+                        self.entries[index % c * size + index / c][kind] = *value;
+                    }
+                }
+            }
+            for (j, &other) in self.others.iter().enumerate() {
+                row.clear();
+                row.extend(columns.iter().map(|column| matrix[(other, *column)]));
+                let values = matrix.col_as_slice(other);
+                column.clear();
+                column.extend(columns.iter().map(|column| values[*column]));
+                for (i, factors) in inverse.as_slice().chunks_exact(c).enumerate() {
+                    self.entries[i * size + c + j][kind] = through(factors, &column);
+                    self.entries[(c + j) * size + i][kind] = through(factors, &row);
+                }
+                for (i, &to) in self.others.iter().enumerate() {
+                    self.entries[(c + i) * size + c + j][kind] = matrix[(to, other)];
+                }
+            }
+        }
+        self.keep_coupled();
+        self.entries.iter().flatten().all(|value| value.is_finite())
+    }
+
+    /// Element of the full part of mass, damping or stiffness.
+    fn full_at(&self, kind: usize, row: usize, column: usize) -> f64 {
+        let first = self.elastic.start;
+        let full = kind.checked_sub(1).map(|kind| &self.full[kind][0]);
+        let at = (row - first) * self.elastic.len() + column - first;
+        full.and_then(|full| full.get(at)).copied().unwrap_or(0.0)
+    }
+
+    /// Leaves out motions that act on nothing and that nothing acts on.
+    fn keep_coupled(&mut self) {
+        let (modes, size) = (self.elastic.len(), self.count + self.others.len());
+        let entries = &self.entries;
+        let coupled = |i: usize| {
+            (0..size).any(|j| entries[i * size + j] != [0.0; 3] || entries[j * size + i] != [0.0; 3])
+        };
+        let kept: Vec<usize> = (0..size).filter(|i| *i >= self.count || coupled(*i)).collect();
+        let entry = |i: &usize, j: &usize| entries[i * size + j];
+        self.entries = kept.iter().flat_map(|i| kept.iter().map(move |j| entry(i, j))).collect();
+        self.count = kept.len() - self.others.len();
+        self.stride = self.count.next_multiple_of(BLOCK);
+        self.motions.clear();
+        for mode in 0..modes {
+            let rows = kept[..self.count].iter().map(|i| self.pivots[*i][0]);
+            self.motions.extend(rows.map(|row| self.candidates[row * modes + mode]));
+            self.motions.resize((mode + 1) * self.stride, 0.0);
+        }
+    }
+
+    /// Whether the reduced form is the model: rows and columns times a vector of signs on the elastic coordinates.
+    fn complete(&self, model: &Model) -> bool {
+        let (c, first) = (self.count, self.elastic.start);
+        let size = c + self.others.len();
+        let sign = |at: usize| if (at * at + at / 3) % 5 < 2 { -1.0 } else { 1.0 };
+        // What the motions see of the signs, and could see at most.
+        let mut seen = vec![[0.0; 2]; c];
+        for (mode, row) in self.motions.chunks_exact(self.stride).enumerate() {
+            for (seen, motion) in seen.iter_mut().zip(row) {
+                seen[0] += motion * sign(first + mode);
+                seen[1] += motion.abs();
+            }
+        }
+        let agree = |value: f64, [sum, size]: [f64; 2]| (value - sum).abs() <= LEFT_OUT * size;
+        // All three at once, at a typical frequency: what is left out of one is not made up for by another.
+        let logarithms: f64 = self.own.iter().map(|own| own[2].ln()).sum();
+        let square = (logarithms / self.own.len() as f64).exp();
+        let powers = [square, square.sqrt(), 1.0];
+        let at = |entry: [f64; 3]| entry[0] * powers[0] + entry[1] * powers[1] + entry[2];
+        let mut products = [vec![0.0; model.coordinates()], vec![0.0; model.coordinates()]];
+        for (matrix, power) in [&model.mass, &model.damping, &model.stiffness].into_iter().zip(powers) {
+            times_signs(matrix, power, &self.elastic, sign, &mut products);
+        }
+        [false, true].into_iter().zip(&products).all(|(transposed, product)| {
+            let entry = |i: usize, j: usize| match transposed {
+                false => at(self.entries[i * size + j]),
+                true => at(self.entries[j * size + i]),
+            };
+            // Forces on a row of the reduced form: the sum, and the sum of moduli.
+            let force = |i: usize| {
+                (0..c).fold([0.0; 2], |[sum, most], j| {
+                    let entry = entry(i, j);
+                    [sum + entry * seen[j][0], most + entry.abs() * seen[j][1]]
+                })
+            };
+            let forces: Vec<[f64; 2]> = (0..c).map(force).collect();
+            let full = |mode: usize| {
+                let sum = |kind: usize| {
+                    let matrix = &self.full[kind][usize::from(transposed)];
+                    let row = matrix.chunks_exact(self.elastic.len()).nth(mode).unwrap_or_default();
+                    row.iter().enumerate().fold([0.0; 2], |[sum, most], (at, value)| {
+                        [sum + value * sign(first + at), most + value.abs()]
+                    })
+                };
+                let [damping, stiffness] = [sum(0), sum(1)];
+                [0, 1].map(|i| damping[i] * powers[1] + stiffness[i])
+            };
+            let elastic = (0..self.elastic.len()).all(|mode| {
+                let own = at(self.own[mode]);
+                let row = &self.motions[mode * self.stride..][..c];
+                let full = full(mode);
+                let start = [own * sign(first + mode) + full[0], own.abs() + full[1]];
+                let expected = row.iter().zip(&forces).fold(start, |[sum, most], (b, f)| {
+                    [sum + b * f[0], most + b.abs() * f[1]]
+                });
+                agree(product[first + mode], expected)
+            });
+            let others = self.others.iter().enumerate();
+            elastic && others.into_iter().all(|(place, &o)| agree(product[o], force(c + place)))
+        })
+    }
+}
+
+/// A sum of products, zero where it is but rounding.
+fn through(factors: &[f64], values: &[f64]) -> f64 {
+    if values.iter().all(|value| *value == 0.0) {
+        return 0.0;
+    }
+    let (mut sum, mut size) = (0.0_f64, 0.0);
+    for (factor, value) in factors.iter().zip(values) {
+        sum += factor * value;
+        size += (factor * value).abs();
+    }
+    if sum.abs() > ROUNDING * size { sum } else { 0.0 }
+}
+
+/// Place and modulus of the largest element.
+fn largest(row: &[f64]) -> (usize, f64) {
+    let most = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    (row.iter().position(|value| value.abs() == most).unwrap_or(0), most)
+}
+
+/// Adds a matrix and its transpose, each times `factor` and signs in `range` and zeros elsewhere.
+fn times_signs(
+    matrix: &Mat<f64>,
+    factor: f64,
+    range: &Range<usize>,
+    sign: impl Fn(usize) -> f64,
+    [product, transposed]: &mut [Vec<f64>; 2],
+) {
+    let signs: Vec<f64> = range.clone().map(|at| factor * sign(at)).collect();
+    for (column, transposed) in transposed.iter_mut().enumerate() {
+        let values = matrix.col_as_slice(column);
+        if range.contains(&column) {
+            let sign = signs[column - range.start];
+            product.iter_mut().zip(values).for_each(|(sum, value)| *sum += sign * value);
+        }
+        // Four sums, so that one need not wait for another.
+        let mut sums = [0.0; 4];
+        for (values, signs) in values[range.clone()].chunks(4).zip(signs.chunks(4)) {
+            for ((sum, value), sign) in sums.iter_mut().zip(values).zip(signs) {
+                *sum += value * sign;
+            }
+        }
+        *transposed += sums.iter().sum::<f64>();
+    }
+}

@@ -1,0 +1,203 @@
+//! Poles and vectors of a reduced model with what is of no few motions, from those of the model without it.
+//!
+//! With L = L₀ + F, F the full part less its diagonal: `x ← x − L₀⁻¹ L(s) x` and the same for the left vector, s from
+//! `yᵀ L(s) x = 0`. What is left falls by about ‖F‖ over the distance of the poles a step, the error of s by its square.
+//! Near its pole L₀ is singular along its own vectors v and w, which are kept out: with `wᵀ L₀' v = 1`, of a residual r what
+//! `v (wᵀ r)` stands for, and of its solution what lies along v.
+
+use super::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
+use super::pencil::{Frequencies, Pencil};
+use faer::c64;
+
+/// Steps before a pole is given up.
+const MOST_STEPS: usize = 12;
+/// Distance of the point of the factors from the pole of L₀, relative.
+const ASIDE: f64 = 1e-7;
+/// Relative size of a step of s below which nothing is left to gain.
+const RESTED: f64 = 1e-15;
+/// What the bound leaves for what is not of first order.
+const SAFETY: f64 = 2.0;
+
+/// Poles of one group, with vectors over the other coordinates of the pencil and then the elastic ones.
+#[derive(Debug, Default)]
+pub struct Refined {
+    /// Poles.
+    pub poles: Complexes,
+    /// Distance from an exact pole, to first order; not finite where the steps did not come to rest.
+    pub bound: [f64; WIDTH],
+    /// First-order change of each pole by the full part.
+    pub shift: Complexes,
+    /// Right vectors.
+    pub right: Vec<Complexes>,
+    /// Left vectors y, `yᵀ L = 0`.
+    pub left: Vec<Complexes>,
+    own: [Vec<Complexes>; 2],
+    slopes: [Vec<Complexes>; 2],
+    residual: Vec<Complexes>,
+    slope: Vec<Complexes>,
+    core: [Vec<Complexes>; 2],
+}
+
+impl Refined {
+    /// Finds the poles near `starts`, those of the model without its full part.
+    pub fn find(&mut self, level: Level, pencil: &mut Pencil, starts: &Complexes) {
+        let size = pencil.places();
+        for vector in [&mut self.right, &mut self.left, &mut self.residual, &mut self.slope]
+            .into_iter()
+            .chain(&mut self.own)
+            .chain(&mut self.slopes)
+        {
+            vector.resize(size, Complexes::ZERO);
+        }
+        for core in &mut self.core {
+            core.resize(pencil.size(), Complexes::ZERO);
+        }
+        level.run(Find { to: self, pencil, starts });
+    }
+}
+
+struct Find<'a> {
+    to: &'a mut Refined,
+    pencil: &'a mut Pencil,
+    starts: &'a Complexes,
+}
+
+#[inline(always)]
+fn dot<V: Vector>(a: &[Complexes], b: &[Complexes]) -> Complex<V> {
+    let mut sums = [Complex::<V>::splat(0.0, 0.0); 2];
+    for (a, b) in a.chunks(2).zip(b.chunks(2)) {
+        for i in 0..a.len() {
+            sums[i] = sums[i].add(Complex::<V>::load(&a[i]).mul(Complex::load(&b[i])));
+        }
+    }
+    sums[0].add(sums[1])
+}
+
+/// `to −= factor · vector`.
+#[inline(always)]
+fn subtract<V: Vector>(to: &mut [Complexes], factor: Complex<V>, vector: &[Complexes]) {
+    for (to, vector) in to.iter_mut().zip(vector) {
+        Complex::<V>::load(to).subtract_product(factor, Complex::load(vector)).store(to);
+    }
+}
+
+#[inline(always)]
+fn scale<V: Vector>(vector: &mut [Complexes], factor: Complex<V>) {
+    for value in vector {
+        Complex::<V>::load(value).mul(factor).store(value);
+    }
+}
+
+/// Makes the largest element one in modulus.
+#[inline(always)]
+fn normalise<V: Vector>(vector: &mut [Complexes]) {
+    let mut largest = V::splat(f64::MIN_POSITIVE);
+    for value in vector.iter() {
+        largest = largest.max(Complex::<V>::load(value).square());
+    }
+    let unit = V::splat(1.0).div(largest.sqrt());
+    scale::<V>(vector, Complex { re: unit, im: V::splat(0.0) });
+}
+
+impl Kernel for Find<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { to, pencil, starts } = self;
+        let Refined { poles, bound, shift, right, left, own, slopes, residual, slope, core } = to;
+        let start = Complex::<V>::load(starts);
+        let mut aside = Complexes::ZERO;
+        start.scale(V::splat(1.0 + ASIDE)).store(&mut aside);
+        pencil.factor::<V>(&aside);
+        let at_factors = Frequencies::<V>::new(&aside, 1.0);
+        let [v, w] = own;
+        pencil.null_vectors::<V>(v, w);
+        // Once more by the same factors: what they left of other vectors is squared.
+        normalise::<V>(v);
+        pencil.solve::<V>(v, core);
+        normalise::<V>(v);
+        normalise::<V>(w);
+        pencil.solve_transposed::<V>(&at_factors, w, core);
+        normalise::<V>(w);
+        let derivative = Frequencies::<V>::slope(start);
+        pencil.apply::<V>(&derivative, None, v, &mut core[0], &mut slopes[0]);
+        let unit = dot::<V>(w, &slopes[0]).reciprocal();
+        scale::<V>(w, unit);
+        pencil.apply_transposed::<V>(&derivative, None, w, &mut core[0], &mut slopes[1]);
+        right.copy_from_slice(v);
+        left.copy_from_slice(w);
+        let mut s = start;
+        let mut last = V::splat(f64::MAX);
+        let mut rested = [false; WIDTH];
+        for step in 0..MOST_STEPS {
+            s.store(poles);
+            let at = Frequencies::<V>::new(poles, 1.0);
+            let derivative = Frequencies::<V>::slope(s);
+            let ones = Complex::<V>::splat(1.0, 0.0);
+            let zeros = Complex::<V>::splat(0.0, 0.0);
+            pencil.apply::<V>(&at, Some([s, ones]), right, &mut core[0], residual);
+            pencil.apply::<V>(&derivative, Some([ones, zeros]), right, &mut core[0], slope);
+            let over = dot::<V>(left, slope).reciprocal();
+            let change = dot::<V>(left, residual).mul(over);
+            s = s.sub(change);
+            if step == 0 {
+                zeros.sub(dot::<V>(left, residual)).store(shift);
+            }
+            // The residual at the new s, to first order in its change.
+            subtract::<V>(residual, change, slope);
+            let size = change.square().sqrt();
+            let mut sizes = [0.0; WIDTH];
+            let (mut moduli, mut before) = ([0.0; WIDTH], [0.0; WIDTH]);
+            size.store(&mut sizes);
+            s.square().sqrt().store(&mut moduli);
+            last.store(&mut before);
+            for lane in 0..WIDTH {
+                let small = sizes[lane] <= RESTED * moduli[lane];
+                // Rounding moves s no less than before.
+                let still = step > 2 && sizes[lane] <= 1e-12 * moduli[lane] && sizes[lane] >= 0.5 * before[lane];
+                rested[lane] |= step > 0 && (small || still);
+            }
+            last = size;
+            if rested == [true; WIDTH] || step + 1 == MOST_STEPS {
+                let (first, rounding) = pencil.uncertainty::<V>(&at, right, left, residual);
+                let doubt = rounding.mul_add(V::splat(0.5 * f64::EPSILON), first.square().sqrt());
+                let doubt = doubt.mul(over.square().sqrt()).add(size);
+                doubt.mul(V::splat(SAFETY)).store(bound);
+                break;
+            }
+            let along = dot::<V>(w, residual);
+            subtract::<V>(residual, along, &slopes[0]);
+            pencil.solve::<V>(residual, core);
+            let along = dot::<V>(&slopes[1], residual);
+            subtract::<V>(residual, along, v);
+            subtract::<V>(right, ones, residual);
+            pencil.apply_transposed::<V>(&at, Some([s, ones]), left, &mut core[0], residual);
+            let along = dot::<V>(v, residual);
+            subtract::<V>(residual, along, &slopes[1]);
+            pencil.solve_transposed::<V>(&at_factors, residual, core);
+            let along = dot::<V>(&slopes[0], residual);
+            subtract::<V>(residual, along, w);
+            subtract::<V>(left, ones, residual);
+        }
+        s.store(poles);
+        for lane in 0..WIDTH {
+            if starts.im[lane] == 0.0 {
+                poles.im[lane] = 0.0;
+            }
+            if !rested[lane] {
+                bound[lane] = f64::INFINITY;
+            }
+        }
+    }
+}
+
+/// Up to eight points as they lie in lanes, the last one repeated.
+pub fn pack(points: &[c64]) -> Complexes {
+    let mut packed = Complexes::ZERO;
+    for lane in 0..WIDTH {
+        let s = points[lane.min(points.len() - 1)];
+        (packed.re[lane], packed.im[lane]) = (s.re, s.im);
+    }
+    packed
+}
