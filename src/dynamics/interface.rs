@@ -55,11 +55,7 @@ impl Interface {
 }
 
 /// Adds the elastic coordinates' own equations `[1, 2ζω, ω²]` to a model that holds what is attached to them.
-pub fn add_own(
-    layout: &Layout,
-    equations: impl IntoIterator<Item = [f64; 3]>,
-    model: &mut Model,
-) {
+pub fn add_own(layout: &Layout, equations: impl IntoIterator<Item = [f64; 3]>, model: &mut Model) {
     let Model { mass, damping, stiffness, interface, .. } = model;
     interface.elastic = layout.elastic();
     for (at, own) in layout.elastic().zip(equations) {

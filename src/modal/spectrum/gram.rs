@@ -52,7 +52,8 @@ impl Gram {
             let (m, d, k) = (V::splat(own[0]), V::splat(own[1]), V::splat(own[2]));
             let value = powers[2].scale(k).add_real_product(d, powers[1]);
             let value = value.add_real_product(m, powers[0]);
-            let size = m.abs().mul_add(moduli[0], d.abs().mul_add(moduli[1], k.abs().mul(moduli[2])));
+            let size =
+                m.abs().mul_add(moduli[0], d.abs().mul_add(moduli[1], k.abs().mul(moduli[2])));
             // At the pole of a mode to the last digit, where e is rounding.
             let least = Complex { re: size.mul(floor), im: V::splat(0.0) };
             let square = value.square();

@@ -624,6 +624,32 @@ mod tests {
         }
     }
 
+    struct Exponent([f64; WIDTH]);
+
+    impl Kernel for Exponent {
+        type Output = [[f64; WIDTH]; 2];
+
+        #[inline(always)]
+        fn run<V: Vector>(self) -> Self::Output {
+            let (exponent, reciprocal) = V::load(&self.0).exponent();
+            [stored(exponent), stored(reciprocal)]
+        }
+    }
+
+    #[test]
+    fn exponents_and_reciprocal_powers_of_two_are_exact_on_every_level() {
+        let power = |exponent: i64| f64::from_bits(((exponent + 1023) as u64) << 52);
+        let mantissas: [f64; WIDTH] =
+            from_fn(|i| 1.0 + i as f64 / 8.0 + f64::EPSILON * (i % 2) as f64);
+        for level in Level::all() {
+            for exponent in (-1022..1023).step_by(if cfg!(miri) { 146 } else { 1 }) {
+                let values = mantissas.map(|mantissa| mantissa * power(exponent));
+                let expected = [[exponent as f64; WIDTH], [power(-exponent); WIDTH]];
+                assert_eq!(level.run(Exponent(values)), expected, "{level:?} {exponent}");
+            }
+        }
+    }
+
     fn pack(values: [c64; WIDTH]) -> Complexes {
         Complexes { re: values.map(|z| z.re), im: values.map(|z| z.im) }
     }

@@ -68,7 +68,11 @@ impl Base {
         let mut reduction = Reduction::default();
         reduction.set(model);
         // Determinants cost as many times their own effort as there are poles, the dense solve the cube of the poles.
-        let effort = if reduction.count > 0 { reduction.effort() } else { (model.second_order as f64).powi(3) };
+        let effort = if reduction.count > 0 {
+            reduction.effort()
+        } else {
+            (model.second_order as f64).powi(3)
+        };
         let worth = effort <= MOST_COORDINATES * (model.second_order as f64).powi(2);
         let base = worth.then(|| Self::of(model, solver).ok()).flatten()?;
         Spectrum::new().solve(&base, model).is_ok().then_some(base)
@@ -101,7 +105,10 @@ impl Spectrum {
         }
     }
 
-    pub fn reduced(&self) -> [usize; 3] { let r = self.pencil.reduction(); [r.elastic.len(), r.count, r.others.len()] }
+    pub fn reduced(&self) -> [usize; 3] {
+        let r = self.pencil.reduction();
+        [r.elastic.len(), r.count, r.others.len()]
+    }
     /// Determinants evaluated for the last model.
     pub fn evaluations(&self) -> usize {
         self.evaluations

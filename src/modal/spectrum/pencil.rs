@@ -146,7 +146,11 @@ impl Pencil {
         // Gimbals and the like see a few motions each.
         let sparse = if self.reduction.count > 0 { others } else { self.states };
         self.elimination.shape(size, sparse, |row, column| {
-            if row < others { entries[row * size + column] != [0.0; 3] } else { forced[column] || row == column }
+            if row < others {
+                entries[row * size + column] != [0.0; 3]
+            } else {
+                forced[column] || row == column
+            }
         });
         if !self.entries.iter().flatten().all(|value| value.is_finite()) {
             return false;
@@ -606,7 +610,12 @@ impl Pencil {
 
 /// `to += factor · matrix · x` with a real square matrix, row by row.
 #[inline(always)]
-fn add_product<V: Vector>(matrix: &[f64], factor: Complex<V>, x: &[Complexes], to: &mut [Complexes]) {
+fn add_product<V: Vector>(
+    matrix: &[f64],
+    factor: Complex<V>,
+    x: &[Complexes],
+    to: &mut [Complexes],
+) {
     let count = x.len();
     for first in (0..count).step_by(BLOCK) {
         let rows = (count - first).min(BLOCK);
@@ -665,11 +674,7 @@ impl<V: Vector> Frequencies<V> {
         let square = s.square().max(V::splat(f64::MIN_POSITIVE));
         let modulus = infinite.where_greater(far, V::splat(typical), square.sqrt());
         let second = [(s.mul(s), square), (s, modulus), (ones, one), (zeros, zero), (zeros, zero)];
-        let mut found = Self {
-            powers: [[[zeros; 3]; 3]; 2],
-            moduli: [[[zero; 3]; 3]; 2],
-            modulus,
-        };
+        let mut found = Self { powers: [[[zeros; 3]; 3]; 2], moduli: [[[zero; 3]; 3]; 2], modulus };
         for degree in 0..3 {
             for kind in 0..3 {
                 let (power, modulus) = second[degree + kind];
@@ -805,8 +810,9 @@ fn scale_motions<V: Vector>(pencil: &mut Pencil) {
 /// Fills in the rows of motions, `[I + GZ, Ga]`.
 #[inline(always)]
 fn condense<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) {
-    let Pencil { size, gram, entries, degree, order, first, rows, values, lanes, elimination, .. } =
-        pencil;
+    let Pencil {
+        size, gram, entries, degree, order, first, rows, values, lanes, elimination, ..
+    } = pencil;
     let (n, others, stride) = (*size, order.len(), pencil.reduction.stride);
     let count = n - others;
     // A sum of as many terms as there are modes, then one over motions; Z itself is a product of inverses.
@@ -858,8 +864,19 @@ fn condense<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) {
 /// with the null vectors that elimination found.
 #[inline(always)]
 fn doubt<V: Vector>(pencil: &mut Pencil) -> V {
-    let Pencil { size, order, reduction, gram, first, rows, values, lanes, elimination, forces, .. } =
-        pencil;
+    let Pencil {
+        size,
+        order,
+        reduction,
+        gram,
+        first,
+        rows,
+        values,
+        lanes,
+        elimination,
+        forces,
+        ..
+    } = pencil;
     let others = order.len();
     let count = *size - others;
     for forces in forces.iter_mut() {

@@ -130,7 +130,8 @@ impl Kernel for Reduced<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> [Complexes; 3] {
-        let Reduction { elastic, others, count, stride, own, motions, entries, .. } = self.reduction;
+        let Reduction { elastic, others, count, stride, own, motions, entries, .. } =
+            self.reduction;
         let zero = Complex::<V>::splat(0.0, 0.0);
         let mut forms = [zero; 3];
         let elastic = &self.vectors[elastic.clone()];

@@ -87,9 +87,7 @@ impl Reduction {
         self.others.extend((0..size).filter(|at| !elastic.contains(at)));
         let whole = (size as f64).powi(3);
         self.gather(model);
-        let worth = |count: usize| {
-            effort(elastic.len(), count, size - elastic.len()) < 0.8 * whole
-        };
+        let worth = |count: usize| effort(elastic.len(), count, size - elastic.len()) < 0.8 * whole;
         if !self.pivot(elastic.len(), worth) {
             return false;
         }
@@ -207,7 +205,9 @@ impl Reduction {
         for (kind, matrix) in matrices.into_iter().enumerate() {
             let between = DMatrix::from_fn(c, c, |i, j| match i == j {
                 true => model.interface.attached[columns[i] - first][kind],
-                false => matrix[(columns[i], columns[j])] - self.full_at(kind, columns[i], columns[j]),
+                false => {
+                    matrix[(columns[i], columns[j])] - self.full_at(kind, columns[i], columns[j])
+                }
             });
             if between.iter().any(|value| *value != 0.0) {
                 let sizes = moduli.tr_mul(&between.abs()) * &moduli;
@@ -250,7 +250,8 @@ impl Reduction {
         let (modes, size) = (self.elastic.len(), self.count + self.others.len());
         let entries = &self.entries;
         let coupled = |i: usize| {
-            (0..size).any(|j| entries[i * size + j] != [0.0; 3] || entries[j * size + i] != [0.0; 3])
+            (0..size)
+                .any(|j| entries[i * size + j] != [0.0; 3] || entries[j * size + i] != [0.0; 3])
         };
         let kept: Vec<usize> = (0..size).filter(|i| *i >= self.count || coupled(*i)).collect();
         let entry = |i: &usize, j: &usize| entries[i * size + j];
@@ -285,7 +286,9 @@ impl Reduction {
         let powers = [square, square.sqrt(), 1.0];
         let at = |entry: [f64; 3]| entry[0] * powers[0] + entry[1] * powers[1] + entry[2];
         let mut products = [vec![0.0; model.coordinates()], vec![0.0; model.coordinates()]];
-        for (matrix, power) in [&model.mass, &model.damping, &model.stiffness].into_iter().zip(powers) {
+        for (matrix, power) in
+            [&model.mass, &model.damping, &model.stiffness].into_iter().zip(powers)
+        {
             times_signs(matrix, power, &self.elastic, sign, &mut products);
         }
         [false, true].into_iter().zip(&products).all(|(transposed, product)| {
@@ -317,9 +320,10 @@ impl Reduction {
                 let row = &self.motions[mode * self.stride..][..c];
                 let full = full(mode);
                 let start = [own * sign(first + mode) + full[0], own.abs() + full[1]];
-                let expected = row.iter().zip(&forces).fold(start, |[sum, most], (b, f)| {
-                    [sum + b * f[0], most + b.abs() * f[1]]
-                });
+                let expected = row
+                    .iter()
+                    .zip(&forces)
+                    .fold(start, |[sum, most], (b, f)| [sum + b * f[0], most + b.abs() * f[1]]);
                 agree(product[first + mode], expected)
             });
             let others = self.others.iter().enumerate();

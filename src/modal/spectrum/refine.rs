@@ -155,7 +155,9 @@ impl Kernel for Find<'_> {
             for lane in 0..WIDTH {
                 let small = sizes[lane] <= RESTED * moduli[lane];
                 // Rounding moves s no less than before.
-                let still = step > 2 && sizes[lane] <= 1e-12 * moduli[lane] && sizes[lane] >= 0.5 * before[lane];
+                let still = step > 2
+                    && sizes[lane] <= 1e-12 * moduli[lane]
+                    && sizes[lane] >= 0.5 * before[lane];
                 rested[lane] |= step > 0 && (small || still);
             }
             last = size;

@@ -154,9 +154,8 @@ fn repeated_poles_are_certified_as_a_cluster_with_their_multiplicity() {
     let nominal: Vec<(f64, f64)> = [1.0, 4.0, 4.0, 9.0, 16.0].map(|k| (0.0625, k)).into();
     let repeated: Vec<(f64, f64)> = [1.25, 4.5, 4.5, 4.5, 16.0].map(|k| (0.0625, k)).into();
     for oscillators in [&nominal, &repeated] {
-        let found = Spectrum::new()
-            .solve(&base(&known(&nominal)), &known(oscillators))
-            .expect("certified");
+        let found =
+            Spectrum::new().solve(&base(&known(&nominal)), &known(oscillators)).expect("certified");
         let exact = roots(oscillators);
         for pole in &found {
             let near: Vec<_> =
@@ -263,8 +262,7 @@ fn the_two_faster_instruction_sets_give_the_same_bits() {
     let nominal = base(&model(&frequencies, 0.1, 0.2));
     let case = model(&frequencies, 0.11, 0.3);
     let levels = Level::all();
-    let solve =
-        |level: &Level| Spectrum::with(*level).solve(&nominal, &case).expect("certified");
+    let solve = |level: &Level| Spectrum::with(*level).solve(&nominal, &case).expect("certified");
     let found: Vec<_> = levels.iter().map(solve).collect();
     let fused = found.len() - 1;
     for pair in found[..fused].windows(2) {
