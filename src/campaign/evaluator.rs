@@ -439,10 +439,15 @@ impl<'a> Evaluator<'a> {
         let plant = place.plant;
         plant.assemble(place.drawn, place.effects, &mut buffers.model);
         let solution = find_poles(at.variants[variant].base.as_ref(), buffers, poles)?;
-        let Buffers { model, scratch, solver, bounds, .. } = buffers;
+        let Buffers { model, scratch, solver, spectrum, bounds } = buffers;
         let mut solved = Solved::new(model, poles);
         let mut rows = Vec::new();
+        let structured = solution.solver == definition::Solver::Structured;
         for mode in 0..at.labels.len() {
+            if structured {
+                let guess = at.variants[variant].references[mode].predict(model);
+                offer_near(guess, &mut solved, spectrum);
+            }
             for (branch, found) in
                 self.identify(at, [variant, mode], &mut solved, solver, scratch)?
             {
@@ -458,6 +463,9 @@ impl<'a> Evaluator<'a> {
         }
         if self.all_poles {
             let named: Vec<Complex<f64>> = rows.iter().map(|row: &Pole| row.value).collect();
+            if structured {
+                offer(poles.clone(), &mut solved, spectrum);
+            }
             for &pole in poles.iter().filter(|pole| !named.contains(pole)) {
                 rows.push(other_pole(plant, solved.reference(solver, pole)));
             }
@@ -496,13 +504,34 @@ fn find_poles(
         poles.extend(certified.iter().map(|pole| pole.root));
         bounds.extend(certified.iter().map(|pole| pole.bound));
         let single = certified.iter().all(|pole| pole.multiplicity == 1);
-        let certificate = if single { Certificate::Discs } else { Certificate::Clusters };
+        let certificate = match (spectrum.is_refined(), single) {
+            (true, _) => Certificate::Residual,
+            (false, true) => Certificate::Discs,
+            (false, false) => Certificate::Clusters,
+        };
         let solver = definition::Solver::Structured;
         return Ok(Solution { solver, certificate, determinants });
     }
     solver.poles(model, poles).map_err(|error| Failure::from(&error))?;
     let (solver, certificate) = (definition::Solver::Dense, Certificate::Residual);
     Ok(Solution { solver, certificate, determinants })
+}
+
+/// Poles whose vectors are found at once.
+const AT_ONCE: usize = 8;
+
+/// Finds the vectors of the poles nearest to a guess by the structure of the model, where it has one.
+fn offer_near(guess: Complex<f64>, solved: &mut Solved<'_>, spectrum: &mut Spectrum) {
+    let mut near = solved.poles().to_vec();
+    near.sort_by(|a, b| (a - guess).norm_sqr().total_cmp(&(b - guess).norm_sqr()));
+    near.truncate(AT_ONCE);
+    offer(near, solved, spectrum);
+}
+
+/// Finds the vectors of poles by the structure of the model, where it has one.
+fn offer(mut poles: Vec<Complex<f64>>, solved: &mut Solved<'_>, spectrum: &mut Spectrum) {
+    poles.retain(|pole| !solved.has_offer(*pole) && !solved.has_seen(*pole));
+    solved.offer(spectrum.vectors(solved.model(), &poles));
 }
 
 /// The other poles that are asked for the second-order change of one: the nearest, and the nearest that identity

@@ -329,6 +329,26 @@ impl Solver {
                 vector.iter_mut().for_each(|z| *z *= scale);
             }
         }
+        self.pair_of(model, pole)
+    }
+
+    /// The pair of vectors found elsewhere, `yᵀ L = 0`, judged as those of [`Solver::pair`] are.
+    pub fn judge(&mut self, model: &Model, pole: c64, [right, left]: &[Vec<c64>; 2]) -> Pair {
+        self.weigh(model, pole);
+        let scaled = |vector: &[c64], to: &mut Vec<c64>, scale: &[f64]| {
+            to.clear();
+            to.extend(vector.iter().zip(scale).map(|(z, scale)| z / *scale));
+            let unit = norm(to).recip();
+            to.iter_mut().for_each(|z| *z *= unit);
+        };
+        scaled(right, &mut self.right, &self.scale);
+        scaled(left, &mut self.left, &self.scale);
+        self.left.iter_mut().for_each(|z| *z = z.conj());
+        self.pair_of(model, pole)
+    }
+
+    /// The pair of the scaled vectors at hand.
+    fn pair_of(&self, model: &Model, pole: c64) -> Pair {
         let (residual, bound) = self.residual(model, pole);
         let unscaled = |vector: &[c64]| {
             let scaled = || vector.iter().zip(&self.scale).map(|(z, scale)| z * *scale);
@@ -338,11 +358,10 @@ impl Solver {
         Pair { pole, right: unscaled(&self.right), left: unscaled(&self.left), residual, bound }
     }
 
-    /// Fills the pencil with `S L(s) S`, where the powers of two S bring the diagonal of
-    /// `|M||s|² + |D||s| + |K|` near one: coordinates of metres, radians and states are told apart by
-    /// their equations, not by their units.
-    fn fill_pencil(&mut self, model: &Model, s: c64) {
-        let (square, modulus) = (s * s, s.norm());
+    /// Powers of two S that bring the diagonal of `S (|M||s|² + |D||s| + |K|) S` near one: coordinates of metres,
+    /// radians and states are told apart by their equations, not by their units.
+    fn weigh(&mut self, model: &Model, s: c64) {
+        let modulus = s.norm();
         for (i, scale) in self.scale.iter_mut().enumerate() {
             let at = (i, i);
             let size = model.mass[at].abs() * modulus * modulus
@@ -351,6 +370,12 @@ impl Solver {
             let power = (-0.5 * size.log2()).round();
             *scale = if power.is_finite() { power.exp2() } else { 1.0 };
         }
+    }
+
+    /// Fills the pencil with `S L(s) S`.
+    fn fill_pencil(&mut self, model: &Model, s: c64) {
+        self.weigh(model, s);
+        let square = s * s;
         for (column, of_column) in self.scale.iter().enumerate() {
             let entries = self.scale.iter().zip(model.column(column));
             let entries =

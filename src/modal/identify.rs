@@ -27,17 +27,34 @@ pub struct Solved<'a> {
     model: &'a Model,
     poles: &'a [c64],
     seen: Vec<Reference>,
+    /// Right and left vectors known beforehand, `yᵀ L = 0`.
+    known: Vec<(c64, [Vec<c64>; 2])>,
 }
 
 impl<'a> Solved<'a> {
     /// A model and all its poles.
     pub fn new(model: &'a Model, poles: &'a [c64]) -> Self {
-        Self { model, poles, seen: Vec::new() }
+        Self { model, poles, seen: Vec::new(), known: Vec::new() }
+    }
+
+    /// The model.
+    pub fn model(&self) -> &'a Model {
+        self.model
     }
 
     /// All poles.
     pub fn poles(&self) -> &'a [c64] {
         self.poles
+    }
+
+    /// Takes right and left vectors of poles, `yᵀ L = 0`, so that they need not be found again.
+    pub fn offer(&mut self, vectors: Vec<(c64, [Vec<c64>; 2])>) {
+        self.known.extend(vectors);
+    }
+
+    /// Whether a pole's vectors were offered.
+    pub fn has_offer(&self, pole: c64) -> bool {
+        self.known.iter().any(|(known, _)| *known == pole)
     }
 
     /// Whether the vectors of a pole are known.
@@ -49,7 +66,12 @@ impl<'a> Solved<'a> {
     pub fn reference(&mut self, solver: &mut Solver, pole: c64) -> &Reference {
         let known = self.seen.iter().position(|known| known.pair.pole == pole);
         let index = known.unwrap_or_else(|| {
-            let pair = solver.pair(self.model, pole);
+            let offered = self.known.iter().find(|(known, _)| *known == pole);
+            let pair = offered.map(|(_, vectors)| solver.judge(self.model, pole, vectors));
+            // Where vectors found elsewhere are not as good as rounding allows, a whole factorisation gives them.
+            let allowed = OFFERED * self.model.coordinates() as f64 * f64::EPSILON;
+            let pair = pair.filter(|pair| pair.residual <= allowed);
+            let pair = pair.unwrap_or_else(|| solver.pair(self.model, pole));
             self.seen.push(Reference::new(self.model, pair));
             self.seen.len() - 1
         });
@@ -98,6 +120,8 @@ const LEAST_OVERLAP: f64 = 0.2;
 pub const STEP_OVERLAP: f64 = 0.9;
 /// … and else halved, down to this fraction of the whole way; there the best is taken.
 const LEAST_STEP: f64 = 1.0 / 256.0;
+/// Largest relative residual of vectors offered, in units of n ε; that of the pole itself is in it.
+const OFFERED: f64 = 100.0;
 /// Candidates are drawn in until the overlaps found leave no more than this unaccounted for.
 const UNACCOUNTED: f64 = 0.05;
 
@@ -183,7 +207,7 @@ impl Reference {
     }
 
     /// First guess of the same pole in `model`: the root nearest s₀ of `y₀ᴴ L(s) x₀ = 0`.
-    fn predict(&self, model: &Model) -> c64 {
+    pub fn predict(&self, model: &Model) -> c64 {
         let mut form = [c64::new(0.0, 0.0); 3];
         for (column, right) in self.pair.right.iter().enumerate() {
             let mut sums = [c64::new(0.0, 0.0); 3];

@@ -20,7 +20,7 @@ pub use secular::{Bounded, Uncertain};
 use self::lanes::{Level, WIDTH};
 use self::pencil::Pencil;
 use self::reduction::Reduction;
-use self::refine::{Refined, pack};
+use self::refine::{Refined, Room, pack};
 use self::scaled::Scaled;
 use self::secular::Secular;
 use super::{Solver, eigen};
@@ -45,9 +45,12 @@ pub struct Spectrum {
     /// Determinants of a round with their errors.
     values: Vec<(Scaled, f64)>,
     evaluations: usize,
-    /// Poles at work with a full part, and whether the last model had one.
-    group: Refined,
+    /// Poles of the last model with its full part and their vectors, group by group; whether it had one.
+    groups: Vec<Refined>,
     refined: bool,
+    /// Poles whose vectors alone are asked for.
+    aside: Refined,
+    room: Room,
 }
 
 impl Base {
@@ -68,12 +71,8 @@ impl Base {
         let mut reduction = Reduction::default();
         reduction.set(model);
         // Determinants cost as many times their own effort as there are poles, the dense solve the cube of the poles.
-        let effort = if reduction.count > 0 {
-            reduction.effort()
-        } else {
-            (model.second_order as f64).powi(3)
-        };
-        let worth = effort <= MOST_COORDINATES * (model.second_order as f64).powi(2);
+        let worth =
+            reduction.effort(model) <= MOST_COORDINATES * (model.second_order as f64).powi(2);
         let base = worth.then(|| Self::of(model, solver).ok()).flatten()?;
         Spectrum::new().solve(&base, model).is_ok().then_some(base)
     }
@@ -100,15 +99,19 @@ impl Spectrum {
             guesses: Vec::new(),
             values: Vec::new(),
             evaluations: 0,
-            group: Refined::default(),
+            groups: Vec::new(),
             refined: false,
+            aside: Refined::default(),
+            room: Room::default(),
         }
     }
 
-    pub fn reduced(&self) -> [usize; 3] {
-        let r = self.pencil.reduction();
-        [r.elastic.len(), r.count, r.others.len()]
+    /// Elastic coordinates that were eliminated for the last model and the motions that others see of them.
+    pub fn reduced(&self) -> [usize; 2] {
+        let reduction = self.pencil.reduction();
+        [reduction.elastic.len(), reduction.count]
     }
+
     /// Determinants evaluated for the last model.
     pub fn evaluations(&self) -> usize {
         self.evaluations
@@ -194,11 +197,12 @@ impl Spectrum {
         }
         let mut found = Vec::with_capacity(without.len());
         let (mut lacking, mut allowed) = (0.0, 0.0);
-        for group in without.chunks(WIDTH) {
+        self.groups.resize_with(without.len().div_ceil(WIDTH), Refined::default);
+        for (group, refined) in without.chunks(WIDTH).zip(&mut self.groups) {
             let starts: Vec<c64> = group.iter().map(|pole| pole.root).collect();
-            self.group.find(self.level, &mut self.pencil, &pack(&starts));
+            refined.find(self.level, &mut self.pencil, &mut self.room, &pack(&starts));
             for (lane, start) in group.iter().enumerate() {
-                let Refined { poles, bound, shift, .. } = &self.group;
+                let Refined { poles, bound, shift, .. } = &*refined;
                 let root = c64::new(poles.re[lane], poles.im[lane]);
                 let bound = bound[lane];
                 if !(bound <= LARGEST_BOUND * root.norm()) {
@@ -222,6 +226,38 @@ impl Spectrum {
             }
         }
         if lacking.abs() <= allowed { Ok(found) } else { Err(Uncertain::Contradicted) }
+    }
+
+    /// Right and left vectors of poles of `model`, the last one solved; none where it is not reduced.
+    pub fn vectors(&mut self, model: &Model, poles: &[c64]) -> Vec<(c64, [Vec<c64>; 2])> {
+        let Self { level, pencil, groups, aside, room, refined, .. } = self;
+        if pencil.reduction().count == 0 || poles.is_empty() {
+            return Vec::new();
+        }
+        let mut found = Vec::with_capacity(poles.len());
+        for group in poles.chunks(WIDTH) {
+            if !*refined {
+                aside.find(*level, pencil, room, &pack(group));
+            }
+            for (lane, &pole) in group.iter().enumerate() {
+                let is = |of: &Refined, lane: usize| {
+                    of.poles.re[lane] == pole.re && of.poles.im[lane] == pole.im
+                };
+                let known = groups
+                    .iter()
+                    .find_map(|of| (0..WIDTH).find(|lane| is(of, *lane)).map(|lane| (of, lane)));
+                let (of, lane) = match *refined {
+                    true => match known {
+                        Some(known) => known,
+                        None => continue,
+                    },
+                    false => (&*aside, lane),
+                };
+                let vectors = [&of.right[..], &of.left[..]];
+                found.push((pole, pencil.unpack(model, pole, lane, vectors)));
+            }
+        }
+        found
     }
 
     /// Whether the last poles are known by their residuals, not by discs that hold all roots.

@@ -384,6 +384,44 @@ impl Pencil {
         self.order.len() + self.reduction.elastic.len()
     }
 
+    /// The right and left vector of a lane in the coordinates of the model, for the pole `s`.
+    pub fn unpack(
+        &self,
+        model: &Model,
+        s: c64,
+        lane: usize,
+        vectors: [&[Complexes]; 2],
+    ) -> [Vec<c64>; 2] {
+        let others = self.order.len();
+        let at = |vector: &[Complexes], place: usize| {
+            c64::new(vector[place].re[lane], vector[place].im[lane])
+        };
+        let mut unpacked = vectors.map(|vector| {
+            let mut to = vec![c64::new(0.0, 0.0); model.coordinates()];
+            for (place, coordinate) in self.order.iter().enumerate() {
+                to[*coordinate] = at(vector, place);
+            }
+            for (mode, coordinate) in self.reduction.elastic.clone().enumerate() {
+                to[coordinate] = at(vector, others + mode);
+            }
+            to
+        });
+        // Columns from which powers were divided out, and one that stands for several.
+        for (coordinate, degree) in self.order.iter().zip(&self.degree) {
+            unpacked[0][*coordinate] /= s.powi(*degree as i32);
+        }
+        if let Some(motion) = &model.null_motion {
+            let n = model.second_order;
+            let turn = unpacked[0][motion.state % n];
+            for &(state, ratio) in &motion.others {
+                let drifts = motion.state < n && state >= n;
+                let turn = if drifts { turn / s } else { turn };
+                unpacked[0][state % n] += turn * ratio;
+            }
+        }
+        unpacked
+    }
+
     /// Number of places of the matrix that is eliminated.
     pub fn size(&self) -> usize {
         self.size
@@ -436,74 +474,59 @@ impl Pencil {
         }
     }
 
-    /// The matrix with these powers for s², s and 1, times a vector; with factors of the full damping and stiffness.
+    /// Matrices with these powers for s², s and 1, times a vector; each with its factors of the full damping and
+    /// stiffness, transposed all or none.
     #[inline(always)]
-    pub fn apply<V: Vector>(
+    pub fn apply<V: Vector, const N: usize>(
         &self,
-        at: &Frequencies<V>,
-        full: Option<[Complex<V>; 2]>,
-        x: &[Complexes],
-        core: &mut [Complexes],
-        to: &mut [Complexes],
-    ) {
-        self.product::<V>(at, full, false, x, core, to);
-    }
-
-    /// The same with the transpose.
-    #[inline(always)]
-    pub fn apply_transposed<V: Vector>(
-        &self,
-        at: &Frequencies<V>,
-        full: Option<[Complex<V>; 2]>,
-        x: &[Complexes],
-        core: &mut [Complexes],
-        to: &mut [Complexes],
-    ) {
-        self.product::<V>(at, full, true, x, core, to);
-    }
-
-    #[inline(always)]
-    fn product<V: Vector>(
-        &self,
-        at: &Frequencies<V>,
-        full: Option<[Complex<V>; 2]>,
+        at: [&Frequencies<V>; N],
+        full: Option<[[Complex<V>; 2]; N]>,
         transposed: bool,
         x: &[Complexes],
         core: &mut [Complexes],
-        to: &mut [Complexes],
+        mut to: [&mut [Complexes]; N],
     ) {
         let others = self.order.len();
         let (elastic, stride) = (&x[others..], self.reduction.stride);
         self.see::<V>(elastic, false, &mut core[others..]);
-        // Sums over others gather in `to`, forces on motions beside.
-        let mut forces = [Complexes::ZERO; MOST_MOTIONS];
-        to[..others].fill(Complexes::ZERO);
         core[..others].copy_from_slice(&x[..others]);
+        // Sums over others gather in `to`, forces on motions beside.
+        let mut forces = [[Complexes::ZERO; MOST_MOTIONS]; N];
+        for n in 0..N {
+            to[n][..others].fill(Complexes::ZERO);
+        }
         for &[row, column] in &self.occupied {
             let entry = self.entries[row * self.size + column];
-            let value = value::<V>(entry, at.powers[0][self.degree[column]]);
             let (from, into) = if transposed { (row, column) } else { (column, row) };
-            let sum = match into < others {
-                true => &mut to[into],
-                false => &mut forces[into - others],
-            };
-            Complex::<V>::load(sum).add(value.mul(Complex::load(&core[from]))).store(sum);
+            let x = Complex::<V>::load(&core[from]);
+            for n in 0..N {
+                let value = value::<V>(entry, at[n].powers[0][self.degree[column]]);
+                let sum = match into < others {
+                    true => &mut to[n][into],
+                    false => &mut forces[n][into - others],
+                };
+                Complex::<V>::load(sum).add(value.mul(x)).store(sum);
+            }
         }
-        let forces = &forces[..self.reduction.count];
+        let count = self.reduction.count;
         let rows = self.reduction.motions.chunks_exact(stride);
         for (mode, row) in rows.enumerate() {
-            let own = value::<V>(self.reduction.own[mode], at.powers[0][0]);
-            let mut sum = own.mul(Complex::load(&elastic[mode]));
-            for i in 0..forces.len() {
-                sum = sum.add_real_product(V::splat(row[i]), Complex::load(&forces[i]));
+            let x = Complex::<V>::load(&elastic[mode]);
+            for n in 0..N {
+                let own = value::<V>(self.reduction.own[mode], at[n].powers[0][0]);
+                let mut sum = own.mul(x);
+                let forces = &forces[n][..count];
+                for i in 0..count {
+                    sum = sum.add_real_product(V::splat(row[i]), Complex::load(&forces[i]));
+                }
+                sum.store(&mut to[n][others + mode]);
             }
-            sum.store(&mut to[others + mode]);
         }
         let Some(factors) = full else { return };
         for kind in 0..2 {
             let matrix = &self.reduction.full[kind][usize::from(transposed)];
             if !matrix.is_empty() {
-                add_product::<V>(matrix, factors[kind], elastic, &mut to[others..]);
+                add_product::<V, N>(matrix, kind, &factors, elastic, &mut to, others);
             }
         }
     }
@@ -608,13 +631,15 @@ impl Pencil {
     }
 }
 
-/// `to += factor · matrix · x` with a real square matrix, row by row.
+/// `to += factor · matrix · x` from place `start` on, with a real square matrix, row by row.
 #[inline(always)]
-fn add_product<V: Vector>(
+fn add_product<V: Vector, const N: usize>(
     matrix: &[f64],
-    factor: Complex<V>,
+    kind: usize,
+    factors: &[[Complex<V>; 2]; N],
     x: &[Complexes],
-    to: &mut [Complexes],
+    to: &mut [&mut [Complexes]; N],
+    start: usize,
 ) {
     let count = x.len();
     for first in (0..count).step_by(BLOCK) {
@@ -638,8 +663,10 @@ fn add_product<V: Vector>(
             }
         }
         for i in 0..rows {
-            let sum = Complex::<V>::load(&to[first + i]).add(sums[i].mul(factor));
-            sum.store(&mut to[first + i]);
+            for n in 0..N {
+                let to = &mut to[n][start + first + i];
+                Complex::<V>::load(to).add(sums[i].mul(factors[n][kind])).store(to);
+            }
         }
     }
 }

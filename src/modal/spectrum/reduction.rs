@@ -14,11 +14,17 @@ use std::ops::Range;
 /// Motions that are summed at once.
 pub const BLOCK: usize = 4;
 /// Most motions of a reduction; more would pay with many hundreds of modes alone.
-pub const MOST_MOTIONS: usize = 128;
+pub const MOST_MOTIONS: usize = 64;
+/// Operations per square of the elastic coordinates and pole of a full part, over 8/3: eight products.
+const FULL: f64 = 12.0;
 /// What is left of a motion, in parts of its largest element, that is of the others.
 const DEPENDENT: f64 = 1e-12;
 /// An element of Z, a or β, in parts of the terms of which it is the sum, that is rounding.
 const ROUNDING: f64 = 1e-14;
+/// Elastic coordinates below which a reduction saves less than it costs.
+const LEAST_MODES: usize = 32;
+/// Most coordinates of a model with a full part that are not reduced.
+const MOST_WHOLE: usize = 48;
 /// Largest part of the terms of a product that may be left out: rounding of the terms.
 const LEFT_OUT: f64 = 1e-12;
 
@@ -57,9 +63,14 @@ fn effort(modes: usize, motions: usize, others: usize) -> f64 {
 }
 
 impl Reduction {
-    /// Operations of a determinant, over 8/3.
-    pub fn effort(&self) -> f64 {
-        effort(self.elastic.len(), self.count, self.others.len())
+    /// Operations of a determinant of the model taken, over 8/3, and what a full part adds for each pole.
+    pub fn effort(&self, model: &Model) -> f64 {
+        if self.count == 0 {
+            return (model.second_order as f64).powi(3);
+        }
+        let modes = self.elastic.len() as f64;
+        let full = if self.is_full() { FULL * modes * modes } else { 0.0 };
+        effort(self.elastic.len(), self.count, self.others.len()) + full
     }
 
     /// Whether the model has a part of no few motions.
@@ -71,7 +82,7 @@ impl Reduction {
     pub fn set(&mut self, model: &Model) {
         let size = model.coordinates();
         self.elastic = model.interface.elastic.clone();
-        if self.elastic.is_empty() || !self.find(model) {
+        if self.elastic.len() < LEAST_MODES || !self.find(model) {
             self.elastic = 0..0;
             self.count = 0;
             self.others.clear();
@@ -87,7 +98,13 @@ impl Reduction {
         self.others.extend((0..size).filter(|at| !elastic.contains(at)));
         let whole = (size as f64).powi(3);
         self.gather(model);
-        let worth = |count: usize| effort(elastic.len(), count, size - elastic.len()) < 0.8 * whole;
+        let modes = elastic.len();
+        let full = known.full.iter().any(|full| !full.is_empty());
+        let full = if full { FULL * (modes * modes) as f64 } else { 0.0 };
+        // With a full part discs prove the poles of a whole matrix, residuals those of a reduced one: where the first is
+        // at hand it is taken.
+        let whole = if full > 0.0 && size <= MOST_WHOLE { 0.0 } else { whole };
+        let worth = |count: usize| effort(modes, count, size - modes) + full < 0.8 * whole;
         if !self.pivot(elastic.len(), worth) {
             return false;
         }

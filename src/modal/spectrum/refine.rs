@@ -12,7 +12,7 @@ use faer::c64;
 /// Steps before a pole is given up.
 const MOST_STEPS: usize = 12;
 /// Distance of the point of the factors from the pole of L₀, relative.
-const ASIDE: f64 = 1e-7;
+const ASIDE: f64 = 1e-9;
 /// Relative size of a step of s below which nothing is left to gain.
 const RESTED: f64 = 1e-15;
 /// What the bound leaves for what is not of first order.
@@ -31,6 +31,12 @@ pub struct Refined {
     pub right: Vec<Complexes>,
     /// Left vectors y, `yᵀ L = 0`.
     pub left: Vec<Complexes>,
+}
+
+/// Vectors at work.
+#[derive(Debug, Default)]
+pub struct Room {
+    /// v and w, and `L₀' v` and `L₀'ᵀ w`.
     own: [Vec<Complexes>; 2],
     slopes: [Vec<Complexes>; 2],
     residual: Vec<Complexes>,
@@ -40,24 +46,23 @@ pub struct Refined {
 
 impl Refined {
     /// Finds the poles near `starts`, those of the model without its full part.
-    pub fn find(&mut self, level: Level, pencil: &mut Pencil, starts: &Complexes) {
+    pub fn find(&mut self, level: Level, pencil: &mut Pencil, room: &mut Room, starts: &Complexes) {
         let size = pencil.places();
-        for vector in [&mut self.right, &mut self.left, &mut self.residual, &mut self.slope]
-            .into_iter()
-            .chain(&mut self.own)
-            .chain(&mut self.slopes)
-        {
+        let Room { own, slopes, residual, slope, core } = room;
+        let vectors = [&mut self.right, &mut self.left, residual, slope];
+        for vector in vectors.into_iter().chain(own).chain(slopes) {
             vector.resize(size, Complexes::ZERO);
         }
-        for core in &mut self.core {
+        for core in core {
             core.resize(pencil.size(), Complexes::ZERO);
         }
-        level.run(Find { to: self, pencil, starts });
+        level.run(Find { to: self, room, pencil, starts });
     }
 }
 
 struct Find<'a> {
     to: &'a mut Refined,
+    room: &'a mut Room,
     pencil: &'a mut Pencil,
     starts: &'a Complexes,
 }
@@ -104,8 +109,9 @@ impl Kernel for Find<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { to, pencil, starts } = self;
-        let Refined { poles, bound, shift, right, left, own, slopes, residual, slope, core } = to;
+        let Self { to, room, pencil, starts } = self;
+        let Refined { poles, bound, shift, right, left } = to;
+        let Room { own, slopes, residual, slope, core } = room;
         let start = Complex::<V>::load(starts);
         let mut aside = Complexes::ZERO;
         start.scale(V::splat(1.0 + ASIDE)).store(&mut aside);
@@ -113,18 +119,22 @@ impl Kernel for Find<'_> {
         let at_factors = Frequencies::<V>::new(&aside, 1.0);
         let [v, w] = own;
         pencil.null_vectors::<V>(v, w);
-        // Once more by the same factors: what they left of other vectors is squared.
-        normalise::<V>(v);
-        pencil.solve::<V>(v, core);
-        normalise::<V>(v);
-        normalise::<V>(w);
-        pencil.solve_transposed::<V>(&at_factors, w, core);
-        normalise::<V>(w);
+        // Once more by the same factors, of L₀' v and w: then other vectors come in by their distance no more.
         let derivative = Frequencies::<V>::slope(start);
-        pencil.apply::<V>(&derivative, None, v, &mut core[0], &mut slopes[0]);
+        normalise::<V>(v);
+        pencil.apply::<V, 1>([&derivative], None, false, v, &mut core[0], [&mut slopes[0]]);
+        normalise::<V>(w);
+        pencil.apply::<V, 1>([&derivative], None, true, w, &mut core[0], [&mut slopes[1]]);
+        v.copy_from_slice(&slopes[0]);
+        pencil.solve::<V>(v, core);
+        w.copy_from_slice(&slopes[1]);
+        pencil.solve_transposed::<V>(&at_factors, w, core);
+        normalise::<V>(v);
+        normalise::<V>(w);
+        pencil.apply::<V, 1>([&derivative], None, false, v, &mut core[0], [&mut slopes[0]]);
         let unit = dot::<V>(w, &slopes[0]).reciprocal();
         scale::<V>(w, unit);
-        pencil.apply_transposed::<V>(&derivative, None, w, &mut core[0], &mut slopes[1]);
+        pencil.apply::<V, 1>([&derivative], None, true, w, &mut core[0], [&mut slopes[1]]);
         right.copy_from_slice(v);
         left.copy_from_slice(w);
         let mut s = start;
@@ -136,8 +146,9 @@ impl Kernel for Find<'_> {
             let derivative = Frequencies::<V>::slope(s);
             let ones = Complex::<V>::splat(1.0, 0.0);
             let zeros = Complex::<V>::splat(0.0, 0.0);
-            pencil.apply::<V>(&at, Some([s, ones]), right, &mut core[0], residual);
-            pencil.apply::<V>(&derivative, Some([ones, zeros]), right, &mut core[0], slope);
+            let full = Some([[s, ones], [ones, zeros]]);
+            let to = [&mut residual[..], &mut slope[..]];
+            pencil.apply::<V, 2>([&at, &derivative], full, false, right, &mut core[0], to);
             let over = dot::<V>(left, slope).reciprocal();
             let change = dot::<V>(left, residual).mul(over);
             s = s.sub(change);
@@ -158,7 +169,7 @@ impl Kernel for Find<'_> {
                 let still = step > 2
                     && sizes[lane] <= 1e-12 * moduli[lane]
                     && sizes[lane] >= 0.5 * before[lane];
-                rested[lane] |= step > 0 && (small || still);
+                rested[lane] |= step > 1 && (small || still);
             }
             last = size;
             if rested == [true; WIDTH] || step + 1 == MOST_STEPS {
@@ -174,7 +185,8 @@ impl Kernel for Find<'_> {
             let along = dot::<V>(&slopes[1], residual);
             subtract::<V>(residual, along, v);
             subtract::<V>(right, ones, residual);
-            pencil.apply_transposed::<V>(&at, Some([s, ones]), left, &mut core[0], residual);
+            let full = Some([[s, ones]]);
+            pencil.apply::<V, 1>([&at], full, true, left, &mut core[0], [residual]);
             let along = dot::<V>(v, residual);
             subtract::<V>(residual, along, &slopes[1]);
             pencil.solve_transposed::<V>(&at_factors, residual, core);

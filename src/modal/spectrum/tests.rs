@@ -272,3 +272,173 @@ fn the_two_faster_instruction_sets_give_the_same_bits() {
         assert!((a.root - b.root).norm() <= a.bound + b.bound);
     }
 }
+
+/// Modes that a few motions couple, with two gimbal-like coordinates and a first-order state: declared as a plant does.
+fn attached(modes: usize, spread: f64, full: bool) -> Model {
+    let (n, size) = (modes + 2, modes + 3);
+    let shape = |motion: usize, mode: usize| {
+        (1.3 * (mode as f64 + 1.0) * (motion as f64 + 1.0) + spread).sin() / (modes as f64).sqrt()
+    };
+    let mut model = Model::zeros(size);
+    model.clear(n);
+    let motions = 3;
+    // Z of mass and damping between motions, a and β.
+    let mass = [[0.4, 0.1, 0.0], [0.1, 0.3, 0.05], [0.0, 0.05, 0.2]];
+    let damping = [[0.02, 0.01, 0.0], [-0.01, 0.03, 0.0], [0.0, 0.004, 0.01]];
+    for p in 0..modes {
+        for q in 0..modes {
+            for i in 0..motions {
+                for j in 0..motions {
+                    let weight = shape(i, p) * shape(j, q);
+                    model.mass[(p, q)] += mass[i][j] * weight;
+                    model.damping[(p, q)] += damping[i][j] * weight;
+                }
+            }
+        }
+        for axis in 0..2 {
+            let coupling = 0.2 * shape(axis, p);
+            model.mass[(p, modes + axis)] = coupling;
+            model.mass[(modes + axis, p)] = coupling;
+            model.stiffness[(p, modes + axis)] = 9.0 * shape(axis, p);
+        }
+        // A sensor of the third motion drives the state.
+        model.stiffness[(n, p)] = -0.3 * shape(2, p);
+    }
+    for axis in 0..2 {
+        let (at, w) = (modes + axis, 5.0 + axis as f64);
+        model.mass[(at, at)] = 0.5;
+        model.damping[(at, at)] = 0.3 * w;
+        model.stiffness[(at, at)] = 0.5 * w * w;
+        model.stiffness[(at, n)] = 0.4;
+    }
+    model.stiffness[(n, n)] = 7.0;
+    model.interface.elastic = 0..modes;
+    for motion in 0..motions {
+        model.interface.motions.extend((0..modes).map(|mode| shape(motion, mode)));
+    }
+    for mode in 0..modes {
+        let at = (mode, mode);
+        let omega = (1.0 + 0.45 * mode as f64) * (1.0 + 0.03 * (spread * mode as f64).sin());
+        let matrices = [&mut model.mass, &mut model.damping, &mut model.stiffness];
+        let own = [1.0, 0.01 * omega, omega * omega];
+        model.interface.attached.push(matrices.each_ref().map(|matrix| matrix[at]));
+        model.interface.own.push(own);
+        matrices.into_iter().zip(own).for_each(|(matrix, own)| matrix[at] += own);
+    }
+    if full {
+        for p in 0..modes {
+            for q in 0..modes {
+                let value =
+                    0.02 / (1.0 + (p as f64 - q as f64).powi(2)) * ((p + 2 * q) as f64).cos();
+                model.damping[(p, q)] += value;
+                model.interface.add_full(0, [p, q], value);
+            }
+        }
+    }
+    model
+}
+
+#[test]
+fn modes_seen_through_few_motions_are_eliminated_in_closed_form_on_every_instruction_set() {
+    let nominal = base(&attached(60, 0.0, false));
+    let case = attached(60, 0.2, false);
+    for level in Level::all() {
+        let mut spectrum = Spectrum::with(level);
+        let found = spectrum.solve(&nominal, &case).expect("certified");
+        assert_eq!(spectrum.reduced(), [60, 3]);
+        assert!(!spectrum.is_refined());
+        check(&found, &case);
+        for pole in &found {
+            assert!(pole.bound < 1e-10 * pole.root.norm(), "{level:?} {pole:?}");
+        }
+    }
+}
+
+#[test]
+fn the_reduced_form_and_the_whole_matrix_have_the_same_poles() {
+    let nominal = base(&attached(40, 0.0, false));
+    let case = attached(40, 0.3, false);
+    let mut plain = case.clone();
+    plain.interface.clear();
+    let (mut spectrum, mut whole) = (Spectrum::new(), Spectrum::new());
+    let found = spectrum.solve(&nominal, &case).expect("certified");
+    let expected = whole.solve(&nominal, &plain).expect("certified");
+    assert_eq!([spectrum.reduced(), whole.reduced()], [[40, 3], [0, 0]]);
+    for (a, b) in found.iter().zip(&expected) {
+        assert!((a.root - b.root).norm() <= a.bound + b.bound, "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn a_coupling_that_no_motion_gives_is_found_and_the_whole_matrix_taken() {
+    let mut case = attached(40, 0.1, false);
+    for (row, column) in [(3, 17), (17, 3)] {
+        case.stiffness[(row, column)] += 1e-3;
+    }
+    let nominal = base(&case);
+    let mut spectrum = Spectrum::new();
+    let found = spectrum.solve(&nominal, &case).expect("certified");
+    assert_eq!(spectrum.reduced(), [0, 0]);
+    check(&found, &case);
+}
+
+#[test]
+fn a_full_damping_matrix_is_added_with_residual_bounds_and_the_trace() {
+    let nominal = base(&attached(60, 0.0, true));
+    let case = attached(60, 0.2, true);
+    for level in Level::all() {
+        let mut spectrum = Spectrum::with(level);
+        let found = spectrum.solve(&nominal, &case).expect("certified");
+        assert!(spectrum.is_refined());
+        check(&found, &case);
+        for pole in &found {
+            assert!(pole.bound < 1e-9 * pole.root.norm(), "{level:?} {pole:?}");
+        }
+        let trace: f64 =
+            found.iter().map(|p| if p.root.im > 0.0 { 2.0 * p.root.re } else { p.root.re }).sum();
+        let state = Solver::new(63).state_matrix(&case).expect("regular").trace();
+        assert!((trace - state).abs() < 1e-11 * state.abs(), "{trace} {state}");
+    }
+}
+
+#[test]
+fn vectors_of_the_reduced_form_are_those_of_the_whole_matrix() {
+    for full in [false, true] {
+        let nominal = base(&attached(60, 0.0, full));
+        let case = attached(60, 0.2, full);
+        let mut spectrum = Spectrum::new();
+        let found = spectrum.solve(&nominal, &case).expect("certified");
+        let poles: Vec<c64> = found.iter().map(|pole| pole.root).collect();
+        let mut solver = Solver::new(63);
+        let vectors = spectrum.vectors(&case, &poles);
+        assert_eq!(vectors.len(), poles.len());
+        for (pole, vectors) in vectors {
+            let pair = solver.judge(&case, pole, &vectors);
+            let dense = solver.pair(&case, pole);
+            // Both see the error of the pole itself.
+            let allowed = 1.1 * dense.residual + 63.0 * f64::EPSILON;
+            assert!(pair.residual < allowed, "{pole}: {:.1e}", pair.residual);
+            for (a, b) in [(&pair.right, &dense.right), (&pair.left, &dense.left)] {
+                let product: c64 = a.iter().zip(b).map(|(a, b)| a.conj() * b).sum();
+                assert!((product.norm() - 1.0).abs() < 1e-9, "{pole}: {}", product.norm());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_full_part_as_strong_as_the_distance_of_poles_is_not_certified_wrongly() {
+    let mut case = attached(60, 0.2, true);
+    for factor in [10.0, 100.0] {
+        let full: Vec<f64> = case.interface.full[0].clone();
+        for (at, value) in full.iter().enumerate() {
+            let more = value * (factor - 1.0);
+            case.damping[(at / 60, at % 60)] += more;
+            case.interface.full[0][at] += more;
+        }
+        let nominal = base(&case);
+        if let Ok(found) = Spectrum::new().solve(&nominal, &case) {
+            check(&found, &case);
+        }
+    }
+}
