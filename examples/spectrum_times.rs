@@ -1,16 +1,22 @@
 //! Times of the certified spectrum and of the dense path on dispersed cases of the reference vehicle, for
 //! `scripts/bench-eigen`: prints a line a case, and writes its state matrix as raw numbers for LAPACK.
 //!
-//!     cargo run --release --example spectrum_times -- RUN.toml FOLDER CASES
+//!     cargo run --release --example spectrum_times -- RUN.toml FOLDER CASES [MODES]
+//!
+//! With a number of modes the stick model of the reference vehicle is solved for as many at 105 s, and engines that
+//! are not gimballed are part of its body.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock and writes files")]
 
 use std::path::Path;
 use std::time::Instant;
 use tvse::campaign::Evaluator;
+use tvse::dispersion::Sampler;
 use tvse::io::scenario::{self, Reach};
 use tvse::modal::Solver;
 use tvse::modal::spectrum::{Base, Spectrum};
+use tvse::structure::{self, Selection, Stick};
+use tvse::vehicle::Vehicle;
 
 /// Repetitions, of which the least time counts: others share the machine.
 const REPETITIONS: usize = 15;
@@ -24,17 +30,58 @@ fn least(mut work: impl FnMut()) -> f64 {
     (0..REPETITIONS).map(time).fold(f64::INFINITY, f64::min)
 }
 
+/// Gives the vehicle as many modes, its engines but the gimballed ones in the body.
+fn with_modes(vehicle: &mut Vehicle, gimballed: &[bool], count: usize) -> Result<(), String> {
+    let stick = include_str!("../vehicles/sls-like/stick.toml");
+    let stick = Stick::parse(stick, "stick.toml").map_err(|e| e.to_string())?;
+    let thresholds = structure::Thresholds::default();
+    let named = &vehicle.named_modes[0].labels;
+    let set = vehicle.modal.at(TIME_S).ok_or("no such flight time")?;
+    let frequency = named.iter().find_map(|label| Some(set.modes[set.mode(label)?].frequency_hz));
+    let frequency = frequency.ok_or("no such mode")?;
+    let (modal, _) = structure::solve(&stick, &[TIME_S], Selection::Count(count), &thresholds)
+        .map_err(|e| e.to_string())?;
+    let near = |mode: &&tvse::vehicle::Mode| (mode.frequency_hz - frequency).abs() < 1e-3;
+    let label = modal.sets[0].modes.iter().find(near).ok_or("the mode is not there")?.label.clone();
+    vehicle.named_modes[0].labels = vec![label];
+    vehicle.modal = modal;
+    for (engine, gimballed) in vehicle.engines.iter_mut().zip(gimballed) {
+        engine.in_modes |= !gimballed;
+    }
+    Ok(())
+}
+
+/// Flight time of the model with a number of modes, s.
+const TIME_S: f64 = 105.0;
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().collect();
-    let [_, run, folder, cases] = &arguments[..] else {
-        return Err("arguments: RUN.toml FOLDER CASES".into());
+    let (run, folder, cases, modes) = match &arguments[..] {
+        [_, run, folder, cases] => (run, folder, cases, None),
+        [_, run, folder, cases, modes] => (run, folder, cases, Some(modes.parse::<usize>()?)),
+        _ => return Err("arguments: RUN.toml FOLDER CASES [MODES]".into()),
     };
-    let loaded = scenario::load(Path::new(run), Reach::Study)?;
-    let definition = &loaded.definition;
-    let sampler = loaded.sampler(definition)?;
+    let mut loaded = scenario::load(Path::new(run), Reach::Study)?;
+    let mut definition = loaded.definition.clone();
+    if let Some(modes) = modes {
+        with_modes(&mut loaded.vehicle.vehicle, &definition.gimballed, modes)?;
+        definition.flight_times_s = vec![TIME_S];
+        definition
+            .variants
+            .retain(|variant| ["no_jet_damping", "case_only"].contains(&&*variant.name));
+    }
+    let definition = &definition;
+    let drawn = include_str!("../dispersions/reference.toml");
+    let dispersion =
+        tvse::scenario::dispersion::read("reference.toml", drawn, &loaded.vehicle.vehicle)
+            .map_err(|e| e.to_string())?;
+    let sampler = match modes {
+        Some(_) => Sampler::new(&dispersion, definition.seed),
+        None => loaded.sampler(definition)?,
+    };
     let evaluator = Evaluator::new(&loaded.vehicle.vehicle, &sampler, definition, false)?;
     println!(
-        "variant,flight_time_s,case,states,file,structured_s,dense_s,determinants,poles,bound"
+        "variant,flight_time_s,case,states,file,structured_s,some_s,all_s,dense_s,determinants,poles,bound,certificate"
     );
     for case in 0..cases.parse()? {
         let mut failed = None;
@@ -54,6 +101,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let structured = least(|| {
                     std::hint::black_box(spectrum.solve(&base, view.model).is_ok());
                 });
+                let found: Vec<_> =
+                    certified.iter().flatten().map(|pole| pole.root).collect();
+                let mut with_vectors = |count: usize| {
+                    least(|| {
+                        let solved = spectrum.solve(&base, view.model).is_ok();
+                        let vectors = spectrum.vectors(view.model, &found[..count.min(found.len())]);
+                        std::hint::black_box((solved, vectors.len()));
+                    })
+                };
+                let (some, all) = (with_vectors(16), with_vectors(usize::MAX));
+                let kind = match (spectrum.is_refined(), certified.is_ok()) {
+                    (_, false) => "none",
+                    (true, _) => "residual",
+                    (false, _) => "discs",
+                };
                 let mut poles = Vec::new();
                 let dense = least(|| {
                     std::hint::black_box(solver.poles(view.model, &mut poles).is_ok());
@@ -64,7 +126,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let (states, count) = (state.nrows(), poles.len());
                 let time = definition.flight_times_s[time];
                 let effort = spectrum.evaluations();
-                println!("{name},{time},{case},{states},{file},{structured:e},{dense:e},{effort},{count},{bound:e}");
+                println!("{name},{time},{case},{states},{file},{structured:e},{some:e},{all:e},{dense:e},{effort},{count},{bound:e},{kind}");
                 Ok(())
             };
             failed = result().err().or(failed.take());

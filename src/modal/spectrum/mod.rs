@@ -33,7 +33,7 @@ const MOST_COORDINATES: f64 = 64.0;
 const MOST_ROUNDS: usize = 6;
 /// Largest bound of a pole by its residual, relative: the bound itself is of first order.
 const LARGEST_BOUND: f64 = 1e-8;
-/// Error of the first-order change of a pole, relative.
+/// Error of the first-order change of a pole by that of its vectors, relative.
 const TRACE: f64 = 1e-9;
 
 /// Buffers for models of one size.
@@ -69,7 +69,7 @@ impl Base {
     /// are too sensitive for discs, would only cost determinants before the dense solver answers.
     pub fn proven(model: &Model, solver: &mut Solver) -> Option<Self> {
         let mut reduction = Reduction::default();
-        reduction.set(model);
+        reduction.set(Level::best(), model);
         // Determinants cost as many times their own effort as there are poles, the dense solve the cube of the poles.
         let worth =
             reduction.effort(model) <= MOST_COORDINATES * (model.second_order as f64).powi(2);
@@ -127,7 +127,7 @@ impl Spectrum {
         if base.degree() != model.states() {
             return Err(Uncertain::Unresolved);
         }
-        if !self.pencil.set(model) {
+        if !self.pencil.set(self.level, model) {
             return Err(Uncertain::NonFinite);
         }
         base.predict(self.level, model, self.pencil.reduction(), &mut self.guesses);

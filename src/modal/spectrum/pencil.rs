@@ -87,8 +87,8 @@ impl Pencil {
 
     /// Takes the entries of a model; false where it is not finite or its mass matrix is not positive
     /// definite.
-    pub fn set(&mut self, model: &Model) -> bool {
-        self.reduction.set(model);
+    pub fn set(&mut self, level: Level, model: &Model) -> bool {
+        self.reduction.set(level, model);
         let n = model.second_order;
         let reduced = self.reduction.elastic.clone();
         self.states = model.coordinates() - n;

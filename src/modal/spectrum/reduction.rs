@@ -6,6 +6,7 @@
 //! `pencil`. Which motions B there may be says `dynamics::Interface`; which of them are independent, and Z, a and β, are
 //! found in the matrices of the model themselves, and a product with a vector of signs proves that nothing is left out.
 
+use super::lanes::{Kernel, Level, Vector, WIDTH};
 use crate::dynamics::Model;
 use faer::Mat;
 use nalgebra::DMatrix;
@@ -79,10 +80,10 @@ impl Reduction {
     }
 
     /// Takes a model: its interface, or no elastic coordinates where there is none, or none that pays.
-    pub fn set(&mut self, model: &Model) {
+    pub fn set(&mut self, level: Level, model: &Model) {
         let size = model.coordinates();
         self.elastic = model.interface.elastic.clone();
-        if self.elastic.len() < LEAST_MODES || !self.find(model) {
+        if self.elastic.len() < LEAST_MODES || !self.find(level, model) {
             self.elastic = 0..0;
             self.count = 0;
             self.others.clear();
@@ -90,7 +91,7 @@ impl Reduction {
         }
     }
 
-    fn find(&mut self, model: &Model) -> bool {
+    fn find(&mut self, level: Level, model: &Model) -> bool {
         let known = &model.interface;
         let size = model.coordinates();
         let elastic = self.elastic.clone();
@@ -128,7 +129,7 @@ impl Reduction {
                 }
             }
         }
-        self.reduce(model) && self.complete(model)
+        self.reduce(model) && self.complete(level, model)
     }
 
     /// Rows that may be motions: those known, and what other coordinates see that are not attached to the body.
@@ -284,7 +285,7 @@ impl Reduction {
     }
 
     /// Whether the reduced form is the model: rows and columns times a vector of signs on the elastic coordinates.
-    fn complete(&self, model: &Model) -> bool {
+    fn complete(&self, level: Level, model: &Model) -> bool {
         let (c, first) = (self.count, self.elastic.start);
         let size = c + self.others.len();
         let sign = |at: usize| if (at * at + at / 3) % 5 < 2 { -1.0 } else { 1.0 };
@@ -302,11 +303,15 @@ impl Reduction {
         let square = (logarithms / self.own.len() as f64).exp();
         let powers = [square, square.sqrt(), 1.0];
         let at = |entry: [f64; 3]| entry[0] * powers[0] + entry[1] * powers[1] + entry[2];
+        let mut signs = Vec::with_capacity(model.coordinates());
         let mut products = [vec![0.0; model.coordinates()], vec![0.0; model.coordinates()]];
         for (matrix, power) in
             [&model.mass, &model.damping, &model.stiffness].into_iter().zip(powers)
         {
-            times_signs(matrix, power, &self.elastic, sign, &mut products);
+            let of = |at| if self.elastic.contains(&at) { power * sign(at) } else { 0.0 };
+            signs.clear();
+            signs.extend((0..model.coordinates()).map(of));
+            level.run(TimesSigns { matrix, signs: &signs, products: &mut products });
         }
         [false, true].into_iter().zip(&products).all(|(transposed, product)| {
             let entry = |i: usize, j: usize| match transposed {
@@ -368,28 +373,45 @@ fn largest(row: &[f64]) -> (usize, f64) {
     (row.iter().position(|value| value.abs() == most).unwrap_or(0), most)
 }
 
-/// Adds a matrix and its transpose, each times `factor` and signs in `range` and zeros elsewhere.
-fn times_signs(
-    matrix: &Mat<f64>,
-    factor: f64,
-    range: &Range<usize>,
-    sign: impl Fn(usize) -> f64,
-    [product, transposed]: &mut [Vec<f64>; 2],
-) {
-    let signs: Vec<f64> = range.clone().map(|at| factor * sign(at)).collect();
-    for (column, transposed) in transposed.iter_mut().enumerate() {
-        let values = matrix.col_as_slice(column);
-        if range.contains(&column) {
-            let sign = signs[column - range.start];
-            product.iter_mut().zip(values).for_each(|(sum, value)| *sum += sign * value);
-        }
-        // Four sums, so that one need not wait for another.
-        let mut sums = [0.0; 4];
-        for (values, signs) in values[range.clone()].chunks(4).zip(signs.chunks(4)) {
-            for ((sum, value), sign) in sums.iter_mut().zip(values).zip(signs) {
-                *sum += value * sign;
+/// Adds a matrix and its transpose, each times `factor` and signs on the elastic coordinates and zeros elsewhere.
+struct TimesSigns<'a> {
+    matrix: &'a Mat<f64>,
+    /// Factor and sign of every coordinate, zero where it is not elastic.
+    signs: &'a [f64],
+    products: &'a mut [Vec<f64>; 2],
+}
+
+impl Kernel for TimesSigns<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { matrix, signs, products: [product, transposed] } = self;
+        let (signs, rest_of_signs) = signs.as_chunks::<WIDTH>();
+        for (column, transposed) in transposed.iter_mut().enumerate() {
+            let (values, rest) = matrix.col_as_slice(column).as_chunks::<WIDTH>();
+            let (sums, rest_of_sums) = product.as_chunks_mut::<WIDTH>();
+            let at = column / WIDTH;
+            let sign = if at < signs.len() {
+                signs[at][column % WIDTH]
+            } else {
+                rest_of_signs[column % WIDTH]
+            };
+            let factor = V::splat(sign);
+            let mut dot = V::splat(0.0);
+            for i in 0..values.len() {
+                let value = V::load(&values[i]);
+                dot = value.mul_add(V::load(&signs[i]), dot);
+                value.mul_add(factor, V::load(&sums[i])).store(&mut sums[i]);
             }
+            let mut lanes = [0.0; WIDTH];
+            dot.store(&mut lanes);
+            let mut sum: f64 = lanes.iter().sum();
+            for i in 0..rest.len() {
+                sum += rest[i] * rest_of_signs[i];
+                rest_of_sums[i] += rest[i] * sign;
+            }
+            *transposed += sum;
         }
-        *transposed += sums.iter().sum::<f64>();
     }
 }
