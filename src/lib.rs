@@ -7,6 +7,10 @@
 //!
 //! One structural frame: `x` along the centreline, positive aft, `y`, `z` lateral,
 //! right-handed; SI units; small rotation vectors.
+//!
+//! No unsafe code but in `modal::spectrum::lanes`.
+
+#![deny(unsafe_code)]
 
 pub mod campaign;
 pub mod cli;

@@ -1,5 +1,7 @@
 //! The `tvse` program.
 
+#![forbid(unsafe_code)]
+
 fn main() -> std::process::ExitCode {
     tvse::cli::run()
 }

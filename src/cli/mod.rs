@@ -225,6 +225,10 @@ mod tests {
             for arg in sub.get_arguments().filter(|arg| arg.get_action().takes_values()) {
                 assert!(arg.is_positional() || arg.is_allow_negative_numbers_set(), "{arg}");
             }
+            // What clap checks in debug builds alone.
+            let groups: Vec<_> = sub.get_groups().map(|group| group.get_id()).collect();
+            let twice = (1..groups.len()).find(|at| groups[..*at].contains(&groups[*at]));
+            assert_eq!(twice, None, "{}: {groups:?}", sub.get_name());
         }
         let line = ["tvse", "margins", "--numerator", "1", "--denominator", "1,1", "--delay", "-1"];
         assert!(command.try_get_matches_from(line).is_ok());

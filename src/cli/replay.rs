@@ -27,6 +27,7 @@ pub struct Args {
         long,
         value_name = "N",
         allow_negative_numbers = true,
+        required = false,
         required_unless_present = "worst",
         default_value_if("worst", clap::builder::ArgPredicate::IsPresent, "0")
     )]

@@ -280,7 +280,8 @@ mod tests {
     #[test]
     fn solutions_satisfy_their_equations_at_every_size_and_level() {
         for level in Level::all() {
-            for size in [1, 2, 7, 8, 9, 16, 41, 80] {
+            // An interpreter takes minutes for the large ones.
+            for size in [1, 2, 7, 8, 9, 16, 41, 80].into_iter().filter(|n| !cfg!(miri) || *n < 16) {
                 let mut factors = Factors::with(size, level);
                 let matrix = |row: usize, column: usize| {
                     if size == 1 { c64::new(2.0, 1.0) } else { entry(size, row, column) }

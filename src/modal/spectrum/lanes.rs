@@ -3,6 +3,12 @@
 //! Kernels are written once over [`Vector`] and compiled for AVX-512, AVX2 with FMA and portable code; which one
 //! runs is found out when the program runs. Lanes never mix, so that AVX-512 and AVX2 give the same
 //! bits; the portable form rounds products that the others do not, and agrees within the error bounds.
+//!
+//! The crate's unsafe code is all here; `scripts/nightly` runs its tests under Miri and a sanitizer.
+#![cfg_attr(
+    target_arch = "x86_64",
+    expect(unsafe_code, reason = "instructions that only some processors have")
+)]
 
 /// Number of lanes.
 pub const WIDTH: usize = 8;
@@ -459,6 +465,286 @@ mod x86 {
                 let greater = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0);
                 Self(_mm512_mask_blend_pd(greater, no.0, yes.0))
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use faer::c64;
+    use std::array::from_fn;
+
+    /// Numbers whose sums, products and comparisons meet every special case.
+    const NUMBERS: [f64; 16] = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        1.0 + f64::EPSILON,
+        1.0 - f64::EPSILON,
+        0.1,
+        -3.7,
+        1e-160,
+        -1e160,
+        f64::MIN_POSITIVE,
+        -5e-324,
+        f64::MAX,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::NAN,
+    ];
+
+    /// All triples of them, eight at a time; some where an interpreter runs this.
+    fn triples() -> impl Iterator<Item = [[f64; WIDTH]; 3]> {
+        let groups = (0..NUMBERS.len().pow(3) / WIDTH).step_by(if cfg!(miri) { 31 } else { 1 });
+        let number = |triple: usize, operand: u32| NUMBERS[triple / 16_usize.pow(operand) % 16];
+        let of =
+            move |group| [0, 1, 2].map(|operand| from_fn(|i| number(group * WIDTH + i, operand)));
+        groups.map(of)
+    }
+
+    #[inline(always)]
+    fn stored<V: Vector>(value: V) -> [f64; WIDTH] {
+        let mut to = [0.0; WIDTH];
+        value.store(&mut to);
+        to
+    }
+
+    /// The same bits, or no number both.
+    fn same(a: f64, b: f64) -> bool {
+        a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())
+    }
+
+    /// Levels whose comparisons run here: Miri has those of AVX2, not of AVX-512.
+    fn comparing() -> impl Iterator<Item = Level> {
+        let all = Level::all().into_iter();
+        #[cfg(all(miri, target_arch = "x86_64"))]
+        let all = all.filter(|level| !matches!(level, Level::Avx512(_)));
+        all
+    }
+
+    struct Arithmetic([[f64; WIDTH]; 3]);
+
+    impl Kernel for Arithmetic {
+        type Output = [[f64; WIDTH]; 8];
+
+        #[inline(always)]
+        fn run<V: Vector>(self) -> Self::Output {
+            let [a, b, c] = self.0.each_ref().map(V::load);
+            [
+                V::splat(self.0[0][0]),
+                a.add(b),
+                a.sub(b),
+                a.mul(b),
+                a.div(b),
+                a.sqrt(),
+                a.mul_add(b, c),
+                a.negative_mul_add(b, c),
+            ]
+            .map(stored)
+        }
+    }
+
+    #[test]
+    fn arithmetic_in_lanes_has_the_bits_of_plain_arithmetic_on_every_level() {
+        for level in Level::all() {
+            let fused = level != Level::Portable;
+            for triple in triples() {
+                let found = level.run(Arithmetic(triple));
+                for lane in 0..WIDTH {
+                    let [a, b, c] = triple.map(|operand| operand[lane]);
+                    let expected = [
+                        triple[0][0],
+                        a + b,
+                        a - b,
+                        a * b,
+                        a / b,
+                        a.sqrt(),
+                        if fused { a.mul_add(b, c) } else { a * b + c },
+                        if fused { (-a).mul_add(b, c) } else { c - a * b },
+                    ];
+                    for (method, expected) in expected.into_iter().enumerate() {
+                        let found = found[method][lane];
+                        assert!(
+                            same(found, expected),
+                            "{level:?}, method {method} of {a:e}, {b:e}, {c:e}: {found:e}, not {expected:e}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn products_within_sums_are_rounded_by_the_portable_level_alone() {
+        // (1 + ε)(1 − ε) = 1 − ε².
+        let triple = [1.0 + f64::EPSILON, 1.0 - f64::EPSILON, -1.0].map(|value| [value; WIDTH]);
+        for level in Level::all() {
+            let left = if level == Level::Portable { 0.0 } else { -f64::EPSILON * f64::EPSILON };
+            let [.., sum, _] = level.run(Arithmetic(triple));
+            assert_eq!(sum, [left; WIDTH], "{level:?}");
+            let [.., difference] = level.run(Arithmetic([triple[0], triple[1], [1.0; WIDTH]]));
+            assert_eq!(difference, [-left; WIDTH], "{level:?}");
+        }
+    }
+
+    struct Comparison([[f64; WIDTH]; 3]);
+
+    impl Kernel for Comparison {
+        type Output = [[f64; WIDTH]; 4];
+
+        #[inline(always)]
+        fn run<V: Vector>(self) -> Self::Output {
+            let [a, b, c] = self.0.each_ref().map(V::load);
+            let (yes, no) = (Complex { re: c, im: a }, Complex { re: b, im: c });
+            let chosen = Complex::where_greater(a, b, yes, no);
+            [a.max(b), a.abs(), chosen.re, chosen.im].map(stored)
+        }
+    }
+
+    #[test]
+    fn comparisons_take_the_other_number_where_one_is_none_on_every_level() {
+        for level in comparing() {
+            for triple in triples() {
+                let found = level.run(Comparison(triple));
+                for lane in 0..WIDTH {
+                    let [a, b, c] = triple.map(|operand| operand[lane]);
+                    let (most, chosen) = if a > b { (a, [c, a]) } else { (b, [b, c]) };
+                    let expected = [most, a.abs(), chosen[0], chosen[1]];
+                    for (method, expected) in expected.into_iter().enumerate() {
+                        let found = found[method][lane];
+                        assert!(
+                            same(found, expected),
+                            "{level:?}, method {method} of {a:e}, {b:e}, {c:e}: {found:e}, not {expected:e}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    struct Exponent([f64; WIDTH]);
+
+    impl Kernel for Exponent {
+        type Output = [[f64; WIDTH]; 2];
+
+        #[inline(always)]
+        fn run<V: Vector>(self) -> Self::Output {
+            let (exponent, reciprocal) = V::load(&self.0).exponent();
+            [stored(exponent), stored(reciprocal)]
+        }
+    }
+
+    #[test]
+    fn exponents_and_reciprocal_powers_of_two_are_exact_on_every_level() {
+        let power = |exponent: i64| f64::from_bits(((exponent + 1023) as u64) << 52);
+        let mantissas: [f64; WIDTH] =
+            from_fn(|i| 1.0 + i as f64 / 8.0 + f64::EPSILON * (i % 2) as f64);
+        for level in Level::all() {
+            for exponent in (-1022..1023).step_by(if cfg!(miri) { 146 } else { 1 }) {
+                let values = mantissas.map(|mantissa| mantissa * power(exponent));
+                let expected = [[exponent as f64; WIDTH], [power(-exponent); WIDTH]];
+                assert_eq!(level.run(Exponent(values)), expected, "{level:?} {exponent}");
+            }
+        }
+    }
+
+    fn pack(values: [c64; WIDTH]) -> Complexes {
+        Complexes { re: values.map(|z| z.re), im: values.map(|z| z.im) }
+    }
+
+    struct ComplexArithmetic([Complexes; 3]);
+
+    impl Kernel for ComplexArithmetic {
+        type Output = [Complexes; 9];
+
+        #[inline(always)]
+        fn run<V: Vector>(self) -> Self::Output {
+            let [a, b, c] = self.0.each_ref().map(Complex::<V>::load);
+            let results = [
+                Complex::splat(2.0, -3.0),
+                a.add(b),
+                a.sub(b),
+                a.mul(b),
+                c.subtract_product(a, b),
+                c.add_real_product(a.re, b),
+                a.scale(b.im),
+                Complex { re: a.square(), im: a.im },
+                a.reciprocal(),
+            ];
+            results.map(|result| {
+                let mut to = Complexes::ZERO;
+                result.store(&mut to);
+                to
+            })
+        }
+    }
+
+    #[test]
+    fn complex_numbers_without_rounding_are_those_of_plain_arithmetic_on_every_level() {
+        // Squares are powers of two, so that reciprocals are exact too.
+        let a = [(1, 0), (0, -1), (1, 1), (-1, 1), (2, 2), (0, 4), (-4, 0), (2, -2)];
+        let a = a.map(|(re, im)| c64::new(f64::from(re), f64::from(im)));
+        let b: [c64; WIDTH] = from_fn(|i| c64::new(i as f64 - 3.0, 2.0 * i as f64 + 1.0));
+        let c: [c64; WIDTH] = from_fn(|i| c64::new(5.0 - i as f64, 7.0 * i as f64));
+        for level in Level::all() {
+            let found = level.run(ComplexArithmetic([a, b, c].map(pack)));
+            let each = |f: &dyn Fn(c64, c64, c64) -> c64| pack(from_fn(|i| f(a[i], b[i], c[i])));
+            let expected = [
+                each(&|_, _, _| c64::new(2.0, -3.0)),
+                each(&|a, b, _| a + b),
+                each(&|a, b, _| a - b),
+                each(&|a, b, _| a * b),
+                each(&|a, b, c| c - a * b),
+                each(&|a, b, c| c + a.re * b),
+                each(&|a, b, _| a * b.im),
+                each(&|a, _, _| c64::new(a.norm_sqr(), a.im)),
+                each(&|a, _, _| a.inv()),
+            ];
+            assert_eq!(found, expected, "{level:?}");
+        }
+    }
+
+    struct Copied<'a>(&'a [f64; WIDTH], &'a mut [f64; WIDTH]);
+
+    impl Kernel for Copied<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<V: Vector>(self) {
+            V::load(self.0).store(self.1);
+        }
+    }
+
+    #[test]
+    fn arrays_at_any_address_are_copied_and_their_neighbours_left_alone() {
+        let from: Vec<f64> = (0..24).map(f64::from).collect();
+        for level in Level::all() {
+            for first in 0..=16 {
+                let mut to = vec![-1.0; 24];
+                let here = first..first + WIDTH;
+                let source = from[here.clone()].try_into().expect("eight numbers");
+                let target = (&mut to[here.clone()]).try_into().expect("eight numbers");
+                level.run(Copied(source, target));
+                for (at, value) in to.into_iter().enumerate() {
+                    let expected = if here.contains(&at) { from[at] } else { -1.0 };
+                    assert_eq!(value, expected, "{level:?} {first} {at}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_machine_has_the_portable_level_and_none_is_faster_than_the_first() {
+        let levels = Level::all();
+        assert_eq!(levels.last(), Some(&Level::Portable));
+        assert_eq!(levels[0], Level::best());
+        #[cfg(target_arch = "x86_64")]
+        {
+            let avx512 = levels.iter().position(|level| matches!(level, Level::Avx512(_)));
+            let avx2 = levels.iter().position(|level| matches!(level, Level::Avx2(_)));
+            assert!(avx512.is_none_or(|at| at == 0 && avx2 == Some(1)));
         }
     }
 }
