@@ -28,7 +28,7 @@ use crate::dynamics::Model;
 use faer::c64;
 
 /// Second-order coordinates beyond which elimination of whole matrices at every pole costs more than a dense solve.
-const MOST_COORDINATES: f64 = 64.0;
+const MOST_COORDINATES: f64 = 80.0;
 /// Rounds of evaluations before a spectrum is given up.
 const MOST_ROUNDS: usize = 6;
 /// Largest bound of a pole by its residual, relative: the bound itself is of first order.

@@ -631,7 +631,8 @@ impl Pencil {
             size = own.mul(y).mul_add(x, size);
         }
         // Own terms, the forces that balance them, and sums over motions and the full part.
-        let rounding = size.mul(V::splat(16.0 + 4.0 * modes.sqrt()));
+        let left_out = self.reduction.left_out / (0.5 * f64::EPSILON);
+        let rounding = size.mul(V::splat(16.0 + 4.0 * modes.sqrt() + left_out));
         (Complex { re: first, im: V::splat(0.0) }, rounding)
     }
 }
@@ -847,8 +848,12 @@ fn condense<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) {
     } = pencil;
     let (n, others, stride) = (*size, order.len(), pencil.reduction.stride);
     let count = n - others;
-    // A sum of as many terms as there are modes, then one over motions; Z itself is known to as much only.
-    let roundings = 32.0 + 2.0 * (pencil.reduction.elastic.len() as f64).sqrt();
+    // A sum of as many terms as there are modes, then one over motions; Z itself is known to as much only, and the
+    // reduced form is the model but for what it leaves out.
+    let reduction = &pencil.reduction;
+    let roundings = 32.0
+        + 2.0 * (reduction.elastic.len() as f64).sqrt()
+        + reduction.left_out / (0.5 * f64::EPSILON);
     for j in 0..n {
         let range = first[j]..first[j + 1];
         let degree = degree[j];

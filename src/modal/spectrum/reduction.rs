@@ -19,14 +19,14 @@ pub const MOST_MOTIONS: usize = 64;
 /// Operations per square of the elastic coordinates and pole of a full part, over 8/3: eight products.
 const FULL: f64 = 12.0;
 /// What is left of a motion, in parts of its largest element, that is of the others.
-const DEPENDENT: f64 = 1e-12;
+const DEPENDENT: f64 = 1e-13;
 /// An element of Z, a or β, in parts of the terms of which it is the sum, that is rounding.
 const ROUNDING: f64 = 2e-15;
 /// Elastic coordinates below which a reduction saves less than it costs.
 const LEAST_MODES: usize = 32;
 /// Most coordinates of a model with a full part that are not reduced.
 const MOST_WHOLE: usize = 48;
-/// Largest part of the terms of a product that may be left out: rounding of the terms.
+/// Largest part of the terms of a product that may be left out; what is counts as rounding.
 const LEFT_OUT: f64 = 1e-12;
 
 /// The interface of one model.
@@ -49,6 +49,8 @@ pub struct Reduction {
     /// What is of no few motions, less its diagonal, which is in `own`: damping and stiffness, and their transposes, square
     /// and row by row; empty where there is none.
     pub full: [[Vec<f64>; 2]; 2],
+    /// Largest difference between the reduced form and the model, in parts of the terms that are summed.
+    pub left_out: f64,
     /// Rows that may be motions; then what elimination leaves of them.
     candidates: Vec<f64>,
     left: Vec<f64>,
@@ -288,7 +290,7 @@ impl Reduction {
     }
 
     /// Whether the reduced form is the model: rows and columns times a vector of signs on the elastic coordinates.
-    fn complete(&self, level: Level, model: &Model) -> bool {
+    fn complete(&mut self, level: Level, model: &Model) -> bool {
         let (c, first) = (self.count, self.elastic.start);
         let size = c + self.others.len();
         let sign = |at: usize| if (at * at + at / 3) % 5 < 2 { -1.0 } else { 1.0 };
@@ -300,7 +302,10 @@ impl Reduction {
                 seen[1] += motion.abs();
             }
         }
-        let agree = |value: f64, [sum, size]: [f64; 2]| (value - sum).abs() <= LEFT_OUT * size;
+        let difference = |value: f64, [sum, size]: [f64; 2]| match value == sum {
+            true => 0.0,
+            false => (value - sum).abs() / size,
+        };
         // All three at once, at a typical frequency: what is left out of one is not made up for by another.
         let logarithms: f64 = self.own.iter().map(|own| own[2].ln()).sum();
         let square = (logarithms / self.own.len() as f64).exp();
@@ -316,7 +321,8 @@ impl Reduction {
             signs.extend((0..model.coordinates()).map(of));
             level.run(TimesSigns { matrix, signs: &signs, products: &mut products });
         }
-        [false, true].into_iter().zip(&products).all(|(transposed, product)| {
+        let mut most = 0.0_f64;
+        for (transposed, product) in [false, true].into_iter().zip(&products) {
             let entry = |i: usize, j: usize| match transposed {
                 false => at(self.entries[i * size + j]),
                 true => at(self.entries[j * size + i]),
@@ -340,7 +346,7 @@ impl Reduction {
                 let [damping, stiffness] = [sum(0), sum(1)];
                 [0, 1].map(|i| damping[i] * powers[1] + stiffness[i])
             };
-            let elastic = (0..self.elastic.len()).all(|mode| {
+            for mode in 0..self.elastic.len() {
                 let own = at(self.own[mode]);
                 let row = &self.motions[mode * self.stride..][..c];
                 let full = full(mode);
@@ -349,11 +355,22 @@ impl Reduction {
                     .iter()
                     .zip(&forces)
                     .fold(start, |[sum, most], (b, f)| [sum + b * f[0], most + b.abs() * f[1]]);
-                agree(product[first + mode], expected)
-            });
-            let others = self.others.iter().enumerate();
-            elastic && others.into_iter().all(|(place, &o)| agree(product[o], force(c + place)))
-        })
+                let difference = difference(product[first + mode], expected);
+                if !(difference <= LEFT_OUT) {
+                    return false;
+                }
+                most = most.max(difference);
+            }
+            for (place, &other) in self.others.iter().enumerate() {
+                let difference = difference(product[other], force(c + place));
+                if !(difference <= LEFT_OUT) {
+                    return false;
+                }
+                most = most.max(difference);
+            }
+        }
+        self.left_out = most;
+        true
     }
 }
 

@@ -13,8 +13,8 @@ use faer::c64;
 const MOST_STEPS: usize = 12;
 /// Distance of the point of the factors from the pole of L₀, relative.
 const ASIDE: f64 = 1e-9;
-/// Relative size of a step of s below which nothing is left to gain.
-const RESTED: f64 = 1e-15;
+/// Relative bound of a pole that is good enough.
+const RESTED: f64 = 2e-11;
 /// What the bound leaves for what is not of first order.
 const SAFETY: f64 = 2.0;
 
@@ -157,28 +157,21 @@ impl Kernel for Find<'_> {
             }
             // The residual at the new s, to first order in its change.
             subtract::<V>(residual, change, slope);
+            let (first, rounding) = pencil.uncertainty::<V>(&at, right, left, residual);
+            let doubt = rounding.mul_add(V::splat(0.5 * f64::EPSILON), first.square().sqrt());
             let size = change.square().sqrt();
-            let mut sizes = [0.0; WIDTH];
+            let doubt = doubt.mul(over.square().sqrt()).add(size).mul(V::splat(SAFETY));
             let (mut moduli, mut before) = ([0.0; WIDTH], [0.0; WIDTH]);
-            size.store(&mut sizes);
             s.square().sqrt().store(&mut moduli);
+            doubt.store(bound);
             last.store(&mut before);
             for lane in 0..WIDTH {
-                let small = sizes[lane] <= RESTED * moduli[lane];
-                // Rounding moves s no less than before.
-                let still = step > 2
-                    && sizes[lane] <= 1e-12 * moduli[lane]
-                    && sizes[lane] >= 0.5 * before[lane];
-                rested[lane] |= step > 1 && (small || still);
+                // Known well enough, or no better than before.
+                let still = step > 1 && !(bound[lane] < 0.5 * before[lane]);
+                rested[lane] |= step > 0 && (bound[lane] <= RESTED * moduli[lane] || still);
             }
-            last = size;
-            if rested == [true; WIDTH] || step + 1 == MOST_STEPS {
-                let (first, rounding) = pencil.uncertainty::<V>(&at, right, left, residual);
-                let doubt = rounding.mul_add(V::splat(0.5 * f64::EPSILON), first.square().sqrt());
-                let doubt = doubt.mul(over.square().sqrt()).add(size);
-                doubt.mul(V::splat(SAFETY)).store(bound);
-                break;
-            }
+            last = doubt;
+            let done = rested == [true; WIDTH] || step + 1 == MOST_STEPS;
             let along = dot::<V>(w, residual);
             subtract::<V>(residual, along, &slopes[0]);
             pencil.solve::<V>(residual, core);
@@ -193,6 +186,9 @@ impl Kernel for Find<'_> {
             let along = dot::<V>(&slopes[0], residual);
             subtract::<V>(residual, along, w);
             subtract::<V>(left, ones, residual);
+            if done {
+                break;
+            }
         }
         s.store(poles);
         for lane in 0..WIDTH {
