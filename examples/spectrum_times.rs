@@ -4,7 +4,7 @@
 //!     cargo run --release --example spectrum_times -- RUN.toml FOLDER CASES [MODES]
 //!
 //! With a number of modes the stick model of the reference vehicle is solved for as many at 105 s, and engines that
-//! are not gimballed are part of its body.
+//! are not gimballed are left out.
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock and writes files")]
 
@@ -30,7 +30,7 @@ fn least(mut work: impl FnMut()) -> f64 {
     (0..REPETITIONS).map(time).fold(f64::INFINITY, f64::min)
 }
 
-/// Gives the vehicle as many modes, its engines but the gimballed ones in the body.
+/// Gives the vehicle as many modes, and leaves it the gimballed engines only.
 fn with_modes(vehicle: &mut Vehicle, gimballed: &[bool], count: usize) -> Result<(), String> {
     let stick = include_str!("../vehicles/sls-like/stick.toml");
     let stick = Stick::parse(stick, "stick.toml").map_err(|e| e.to_string())?;
@@ -45,9 +45,8 @@ fn with_modes(vehicle: &mut Vehicle, gimballed: &[bool], count: usize) -> Result
     let label = modal.sets[0].modes.iter().find(near).ok_or("the mode is not there")?.label.clone();
     vehicle.named_modes[0].labels = vec![label];
     vehicle.modal = modal;
-    for (engine, gimballed) in vehicle.engines.iter_mut().zip(gimballed) {
-        engine.in_modes |= !gimballed;
-    }
+    let mut gimballed = gimballed.iter();
+    vehicle.engines.retain(|_| gimballed.next().is_some_and(|gimballed| *gimballed));
     Ok(())
 }
 
@@ -65,6 +64,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut definition = loaded.definition.clone();
     if let Some(modes) = modes {
         with_modes(&mut loaded.vehicle.vehicle, &definition.gimballed, modes)?;
+        definition.gimballed.retain(|gimballed| *gimballed);
         definition.flight_times_s = vec![TIME_S];
         definition
             .variants

@@ -21,15 +21,28 @@ pub struct Elimination {
     pub matrix: Vec<Complexes>,
     /// What rounding may have done to each element before, in units of the unit roundoff.
     pub doubt: Vec<[f64; WIDTH]>,
-    /// Elements that are not zero by structure: of the matrix, and of the factors.
+    /// Elements that are not zero by structure: of the matrix, of the factors as long as no sparse rows are exchanged, and
+    /// of the factors.
     structure: Pattern,
+    planned: Pattern,
     filled: Pattern,
+    /// The planned factors and, where rows were exchanged so that they are others, the factors.
+    plan: Lists,
+    found: Lists,
+    exchanged: bool,
+    /// Rows with an element in each sparse column of the planned factors, below its diagonal.
+    beneath: Ragged,
+    /// Columns of each row of the matrix that are not zero by structure.
+    elements: Ragged,
+    /// Elements of the planned factors that are zero in the matrix.
+    missing: Vec<usize>,
     /// The row of the matrix at each place.
     rows: Vec<usize>,
     /// The same lane by lane, where single lanes exchanged theirs.
     origin: Vec<[u16; WIDTH]>,
     column: Vec<Complexes>,
-    /// Columns of a sparse pivot's row.
+    /// Places of the rows with an element in a sparse pivot's column, and columns of its row.
+    below: Vec<usize>,
     listed: Vec<usize>,
     /// Elements of unit modulus and no order.
     probe: Vec<c64>,
@@ -90,19 +103,71 @@ impl Pattern {
         }
     }
 
-    /// The next column of a row from `first` on; beyond the last where there is none.
+    /// The columns of a row from `first` on and before `end`.
     #[inline(always)]
-    fn next(&self, row: usize, first: usize) -> usize {
+    fn columns(&self, row: usize, first: usize, end: usize) -> impl Iterator<Item = usize> {
+        let (mut word, end) = (first / 64, end.min(64 * self.words));
         let words = self.row(row);
-        let mut word = first / 64;
-        let Some(start) = words.get(word) else { return usize::MAX };
-        let mut left = start & (u64::MAX << (first % 64));
-        while left == 0 {
-            word += 1;
-            let Some(next) = words.get(word) else { return usize::MAX };
-            left = *next;
+        let mut left = words.get(word).map_or(0, |start| start & (u64::MAX << (first % 64)));
+        std::iter::from_fn(move || {
+            while left == 0 {
+                word += 1;
+                left = *words.get(word)?;
+            }
+            let column = 64 * word + left.trailing_zeros() as usize;
+            left &= left - 1;
+            (column < end).then_some(column)
+        })
+    }
+}
+
+/// Columns of factors that are not zero by structure: for each row those of sparse columns on the left of its
+/// diagonal, and for each sparse row those on the right.
+#[derive(Clone, Default)]
+struct Lists {
+    lower: Ragged,
+    upper: Ragged,
+}
+
+/// Lists one after the other.
+#[derive(Clone, Default)]
+struct Ragged {
+    ranges: Vec<[usize; 2]>,
+    items: Vec<usize>,
+}
+
+impl Ragged {
+    fn clear(&mut self, count: usize) {
+        self.ranges.clear();
+        self.ranges.resize(count, [0; 2]);
+        self.items.clear();
+    }
+
+    fn set(&mut self, index: usize, items: impl Iterator<Item = usize>) {
+        let first = self.items.len();
+        self.items.extend(items);
+        self.ranges[index] = [first, self.items.len()];
+    }
+
+    #[inline(always)]
+    fn get(&self, index: usize) -> &[usize] {
+        let [first, last] = self.ranges[index];
+        &self.items[first..last]
+    }
+}
+
+impl Lists {
+    /// Those of a pattern whose rows are at these places.
+    fn take(&mut self, pattern: &Pattern, rows: &[usize], sparse: usize) {
+        let n = rows.len();
+        self.lower.clear(n);
+        self.upper.clear(n);
+        for (place, &row) in rows.iter().enumerate() {
+            self.lower.set(row, pattern.columns(row, 0, place.min(sparse)));
+            if place < sparse {
+                self.upper.set(row, pattern.columns(row, place + 1, n));
+            }
         }
-        64 * word + left.trailing_zeros() as usize
     }
 }
 
@@ -120,11 +185,19 @@ impl Elimination {
             sparse: 0,
             matrix: Vec::new(),
             doubt: Vec::new(),
-            structure: Pattern::new(0),
-            filled: Pattern::new(0),
+            structure: Pattern::default(),
+            planned: Pattern::default(),
+            filled: Pattern::default(),
+            plan: Lists::default(),
+            found: Lists::default(),
+            exchanged: false,
+            beneath: Ragged::default(),
+            elements: Ragged::default(),
+            missing: Vec::new(),
             rows: Vec::new(),
             origin: Vec::new(),
             column: Vec::new(),
+            below: Vec::new(),
             listed: Vec::new(),
             probe: Vec::new(),
             moduli: Default::default(),
@@ -139,8 +212,9 @@ impl Elimination {
         self.size = size;
         self.matrix.resize(size * size, Complexes::ZERO);
         self.doubt.resize(size * size, [0.0; WIDTH]);
-        self.structure = Pattern::new(size);
-        self.filled = Pattern::new(size);
+        for pattern in [&mut self.structure, &mut self.planned, &mut self.filled] {
+            *pattern = Pattern::new(size);
+        }
         self.rows.resize(size, 0);
         self.origin.resize(size, [0; WIDTH]);
         self.probe = (0..size).map(|i| c64::new(angle(i).cos(), angle(i).sin())).collect();
@@ -152,10 +226,10 @@ impl Elimination {
         }
     }
 
-    /// The first column of a row from `first` on whose element is not zero by structure.
+    /// Columns of a row whose elements are not zero by structure.
     #[inline(always)]
-    pub fn element(&self, row: usize, first: usize) -> usize {
-        self.structure.next(row, first)
+    pub fn elements(&self, row: usize) -> &[usize] {
+        self.elements.get(row)
     }
 
     /// Takes the structure: the numbers of rows and of sparse rows, and which elements are not zero.
@@ -165,17 +239,59 @@ impl Elimination {
         sparse: usize,
         mut nonzero: impl FnMut(usize, usize) -> bool,
     ) {
+        let known = size == self.size && sparse == self.sparse;
         if size != self.size {
             self.resize(size);
         }
         self.sparse = sparse;
+        // The pattern before is in `filled`, which every run sets anew.
+        std::mem::swap(&mut self.structure, &mut self.filled);
         self.structure.bits.fill(0);
-        for row in 0..self.size {
-            for column in 0..self.size {
+        for row in 0..size {
+            for column in 0..size {
                 if nonzero(row, column) {
                     self.structure.set(row, column);
                 }
             }
+        }
+        if !known || self.structure.bits != self.filled.bits {
+            self.plan();
+        }
+    }
+
+    /// The factors' structure where sparse rows are not exchanged.
+    fn plan(&mut self) {
+        let (n, sparse) = (self.size, self.sparse);
+        let planned = &mut self.planned;
+        planned.bits.copy_from_slice(&self.structure.bits);
+        for k in 0..sparse {
+            for row in k + 1..n {
+                if planned.has(row, k) {
+                    for column in k + 1..n {
+                        if planned.has(k, column) {
+                            planned.set(row, column);
+                        }
+                    }
+                }
+            }
+        }
+        for row in sparse..n {
+            planned.set_from(row, sparse, n);
+        }
+        let rows: Vec<usize> = (0..n).collect();
+        self.plan.take(planned, &rows, sparse);
+        self.beneath.clear(sparse);
+        for k in 0..sparse {
+            self.beneath.set(k, (k + 1..n).filter(|row| planned.has(*row, k)));
+        }
+        self.elements.clear(n);
+        for row in 0..n {
+            self.elements.set(row, self.structure.columns(row, 0, n));
+        }
+        self.missing.clear();
+        for row in rows {
+            let filled = planned.columns(row, 0, n).filter(|j| !self.structure.has(row, *j));
+            self.missing.extend(filled.map(|column| row * n + column));
         }
     }
 
@@ -187,17 +303,26 @@ impl Elimination {
             *row = i;
             *origin = [i as u16; WIDTH];
         }
-        self.filled.bits.copy_from_slice(&self.structure.bits);
+        for &at in &self.missing {
+            self.matrix[at] = Complexes::ZERO;
+        }
+        self.filled.bits.copy_from_slice(&self.planned.bits);
+        self.exchanged = false;
         let mut product = scaled::Product::<V>::new();
         let mut sign = [1.0; WIDTH];
         for k in 0..self.sparse {
             self.eliminate_sparse::<V>(k, &mut product, &mut sign);
         }
-        for i in self.sparse..n {
-            self.fill_row(self.rows[i], self.sparse);
+        if self.exchanged {
+            for i in self.sparse..n {
+                self.fill_row(self.rows[i], self.sparse);
+            }
         }
         for j in self.sparse..n {
             self.eliminate_dense::<V>(j, &mut product, &mut sign);
+        }
+        if self.exchanged {
+            self.found.take(&self.filled, &self.rows, self.sparse);
         }
         let value = product.finish();
         let value = std::array::from_fn(|lane| value[lane].times(c64::new(sign[lane], 0.0)));
@@ -206,16 +331,20 @@ impl Elimination {
     }
 
     /// Makes a row dense from column `first` on.
-    #[inline(always)]
     fn fill_row(&mut self, row: usize, first: usize) {
-        let n = self.size;
-        let mut from = first;
-        while from < n {
-            let next = self.filled.next(row, from).min(n);
-            self.matrix[row * n + from..row * n + next].fill(Complexes::ZERO);
-            from = next + 1;
+        for column in first..self.size {
+            if !self.filled.has(row, column) {
+                self.filled.set(row, column);
+                self.matrix[row * self.size + column] = Complexes::ZERO;
+            }
         }
-        self.filled.set_from(row, first, n);
+    }
+
+    /// Finds the rows with an element in a sparse pivot's column by their pattern.
+    fn look_below(&mut self, k: usize) {
+        let Self { size, rows, filled, below, .. } = self;
+        below.clear();
+        below.extend((k + 1..*size).filter(|i| filled.has(rows[*i], k)));
     }
 
     /// Eliminates a sparse column: rows that have an element there are combined with the pivot's at once.
@@ -227,32 +356,44 @@ impl Elimination {
         sign: &mut [f64; WIDTH],
     ) {
         let n = self.size;
-        let mut most = V::splat(0.0);
-        for i in k..n {
-            let row = self.rows[i];
-            self.column[i] = Complexes::ZERO;
-            if self.filled.has(row, k) {
-                self.column[i] = self.matrix[row * n + k];
-                most = most.max(Complex::<V>::load(&self.column[i]).square());
-            }
+        if self.exchanged {
+            self.look_below(k);
+        } else {
+            self.below.clear();
+            self.below.extend_from_slice(self.beneath.get(k));
         }
-        let inverse = self.choose::<V>(k, self.sparse, most, product, sign);
+        let mut most = V::splat(0.0);
+        for &i in [k].iter().chain(&self.below) {
+            self.column[i] = self.matrix[self.rows[i] * n + k];
+            most = most.max(Complex::<V>::load(&self.column[i]).square());
+        }
+        if most.any_greater(self.pivot_limit::<V>(k)) {
+            for i in k..n {
+                if !self.filled.has(self.rows[i], k) {
+                    self.column[i] = Complexes::ZERO;
+                }
+            }
+            self.exchange::<V>(k, self.sparse, most, sign);
+            self.exchanged = true;
+            self.look_below(k);
+        }
+        let inverse = self.take_pivot::<V>(k, product);
         let pivot_row = self.rows[k];
         inverse.store(&mut self.matrix[pivot_row * n + k]);
         self.listed.clear();
-        let mut j = self.filled.next(pivot_row, k + 1);
-        while j < n {
-            self.listed.push(j);
-            j = self.filled.next(pivot_row, j + 1);
+        if self.exchanged {
+            self.listed.extend(self.filled.columns(pivot_row, k + 1, n));
+        } else {
+            self.listed.extend_from_slice(self.plan.upper.get(k));
         }
-        for i in k + 1..n {
+        for at in 0..self.below.len() {
+            let i = self.below[at];
             let row = self.rows[i];
-            if !self.filled.has(row, k) {
-                continue;
-            }
             let multiplier = Complex::<V>::load(&self.column[i]).mul(inverse);
             multiplier.store(&mut self.matrix[row * n + k]);
-            self.fill_missing(row, pivot_row, k + 1);
+            if self.exchanged {
+                self.fill_missing(row, pivot_row, k + 1);
+            }
             let [of, from] = if row < pivot_row {
                 let (low, high) = self.matrix.split_at_mut(pivot_row * n);
                 [&mut low[row * n..][..n], &mut high[..n]]
@@ -275,6 +416,7 @@ impl Elimination {
             let low = first.saturating_sub(64 * word);
             let theirs = self.filled.bits[other * words + word] & (u64::MAX << low);
             let mut missing = theirs & !self.filled.bits[row * words + word];
+            self.exchanged |= missing != 0;
             self.filled.bits[row * words + word] |= theirs;
             while missing != 0 {
                 let column = 64 * word + missing.trailing_zeros() as usize;
@@ -301,7 +443,10 @@ impl Elimination {
         for value in &self.column[j..] {
             most = most.max(Complex::<V>::load(value).square());
         }
-        let inverse = self.choose::<V>(j, n, most, product, sign);
+        if most.any_greater(self.pivot_limit::<V>(j)) {
+            self.exchange::<V>(j, n, most, sign);
+        }
+        let inverse = self.take_pivot::<V>(j, product);
         inverse.store(&mut self.matrix[self.rows[j] * n + j]);
         for i in first..j {
             self.matrix[self.rows[i] * n + j] = self.column[i];
@@ -312,17 +457,28 @@ impl Elimination {
         }
     }
 
-    /// Brings a good pivot to place `j`, from the places before `end` if there is one, multiplies the determinant by
-    /// it, and gives its reciprocal. `most` is the largest square of the column.
+    /// What no square in the column may be greater than, so that the row at place `j` can stay.
     #[inline(always)]
-    fn choose<V: Vector>(
-        &mut self,
-        j: usize,
-        end: usize,
-        most: V,
-        product: &mut scaled::Product<V>,
-        sign: &mut [f64; WIDTH],
-    ) -> Complex<V> {
+    fn pivot_limit<V: Vector>(&self, j: usize) -> V {
+        Complex::<V>::load(&self.column[j]).square().mul(V::splat(LARGEST_MULTIPLIER))
+    }
+
+    /// Multiplies the determinant by the pivot at place `j` and gives its reciprocal.
+    #[inline(always)]
+    fn take_pivot<V: Vector>(&mut self, j: usize, product: &mut scaled::Product<V>) -> Complex<V> {
+        let square = Complex::<V>::load(&self.column[j]).square();
+        if V::splat(f64::MIN_POSITIVE).any_greater(square) {
+            guard(&mut self.column[j]);
+        }
+        let pivot = Complex::<V>::load(&self.column[j]);
+        product.times(pivot);
+        pivot.reciprocal()
+    }
+
+    /// Brings a good pivot to place `j`, from the places before `end` if there is one. `most` is the largest square of the
+    /// column.
+    #[inline(always)]
+    fn exchange<V: Vector>(&mut self, j: usize, end: usize, most: V, sign: &mut [f64; WIDTH]) {
         let (mut best, good) = pivot::<V>(&self.column[j..end], most);
         if !good && end < self.size {
             (best, _) = pivot::<V>(&self.column[j..], most);
@@ -334,10 +490,6 @@ impl Elimination {
             *sign = sign.map(|sign| -sign);
         }
         self.exchange_lanes::<V>(j, most, sign);
-        guard(&mut self.column[j]);
-        let pivot = Complex::<V>::load(&self.column[j]);
-        product.times(pivot);
-        pivot.reciprocal()
     }
 
     /// Exchanges rows in those lanes alone whose pivot is still far below the largest.
@@ -436,86 +588,49 @@ impl Elimination {
         }
     }
 
-    /// The first column from `first` on of the factors' row at a place that is not zero by structure: all are
-    /// where both are of the dense part.
-    #[inline(always)]
-    fn next(&self, place: usize, row: usize, first: usize) -> usize {
-        let dense = first >= self.sparse && place >= self.sparse;
-        if dense { first } else { self.filled.next(row, first) }
-    }
-
     /// Solves with the factors: right sides by row of the matrix, solutions by column.
     #[inline(always)]
     pub fn solve<V: Vector>(&mut self, right_side: &[Complexes], to: &mut [Complexes]) {
-        let n = self.size;
-        for i in 0..n {
-            self.gather(i, right_side);
-            let row = self.rows[i];
-            let mut sum = Complex::<V>::load(&self.column[i]);
-            let mut k = self.next(i, row, 0);
-            while k < i {
-                let l = Complex::load(&self.matrix[row * n + k]);
-                sum = sum.subtract_product(l, Complex::load(&self.column[k]));
-                k = self.next(i, row, k + 1);
+        let Self { matrix, rows, plan, found, exchanged, sparse, origin, column, .. } = self;
+        let lists = if *exchanged { found } else { plan };
+        let factors = Factors { matrix, rows, lists, sparse: *sparse };
+        for i in 0..factors.rows.len() {
+            for (lane, &row) in origin[i].iter().enumerate() {
+                let from = &right_side[usize::from(row)];
+                column[i].re[lane] = from.re[lane];
+                column[i].im[lane] = from.im[lane];
             }
-            sum.store(&mut self.column[i]);
+            let sum = Complex::<V>::load(&column[i]);
+            factors.without_left(i, sum, column).store(&mut column[i]);
         }
-        for k in (0..n).rev() {
-            let row = self.rows[k];
-            let mut sum = Complex::<V>::load(&self.column[k]);
-            let mut j = self.next(k, row, k + 1);
-            while j < n {
-                let u = Complex::<V>::load(&self.matrix[row * n + j]);
-                sum = sum.subtract_product(u, Complex::load(&to[j]));
-                j = self.next(k, row, j + 1);
-            }
-            sum.mul(Complex::load(&self.matrix[row * n + k])).store(&mut to[k]);
+        for k in (0..factors.rows.len()).rev() {
+            let sum = Complex::<V>::load(&column[k]);
+            let sum = factors.without_right(k, sum, to);
+            sum.mul(Complex::load(&factors.row(k)[k])).store(&mut to[k]);
         }
     }
 
     /// Solves with the transposed factors: right sides by column of the matrix, solutions by row.
     #[inline(always)]
     pub fn solve_transposed<V: Vector>(&mut self, right_side: &[Complexes], to: &mut [Complexes]) {
-        let n = self.size;
-        self.column.copy_from_slice(right_side);
-        for i in 0..n {
-            let row = self.rows[i];
-            let inverse = Complex::load(&self.matrix[row * n + i]);
-            let a = Complex::<V>::load(&self.column[i]).mul(inverse);
-            a.store(&mut self.column[i]);
-            let mut k = self.next(i, row, i + 1);
-            while k < n {
-                let u = Complex::load(&self.matrix[row * n + k]);
-                let value = Complex::<V>::load(&self.column[k]);
-                value.subtract_product(a, u).store(&mut self.column[k]);
-                k = self.next(i, row, k + 1);
-            }
+        let Self { matrix, rows, plan, found, exchanged, sparse, origin, column, .. } = self;
+        let lists = if *exchanged { found } else { plan };
+        let factors = Factors { matrix, rows, lists, sparse: *sparse };
+        column.copy_from_slice(right_side);
+        for i in 0..factors.rows.len() {
+            let inverse = Complex::load(&factors.row(i)[i]);
+            let a = Complex::<V>::load(&column[i]).mul(inverse);
+            a.store(&mut column[i]);
+            factors.spread_right(i, a, column);
         }
-        for i in (0..n).rev() {
-            let row = self.rows[i];
-            let b = Complex::<V>::load(&self.column[i]);
-            let mut k = self.next(i, row, 0);
-            while k < i {
-                let l = Complex::load(&self.matrix[row * n + k]);
-                let value = Complex::<V>::load(&self.column[k]);
-                value.subtract_product(b, l).store(&mut self.column[k]);
-                k = self.next(i, row, k + 1);
+        for i in (0..factors.rows.len()).rev() {
+            let b = Complex::<V>::load(&column[i]);
+            factors.spread_left(i, b, column);
+            for (lane, &row) in origin[i].iter().enumerate() {
+                let row = usize::from(row);
+                to[row].re[lane] = column[i].re[lane];
+                to[row].im[lane] = column[i].im[lane];
             }
-            for lane in 0..WIDTH {
-                let row = usize::from(self.origin[i][lane]);
-                to[row].re[lane] = self.column[i].re[lane];
-                to[row].im[lane] = self.column[i].im[lane];
-            }
-        }
-    }
-
-    /// Puts the right side of the row at a place there, lane by lane.
-    #[inline(always)]
-    fn gather(&mut self, place: usize, right_side: &[Complexes]) {
-        for lane in 0..WIDTH {
-            let from = &right_side[usize::from(self.origin[place][lane])];
-            self.column[place].re[lane] = from.re[lane];
-            self.column[place].im[lane] = from.im[lane];
         }
     }
 
@@ -534,102 +649,75 @@ impl Elimination {
         for (value, unit) in self.column.iter_mut().zip(&self.probe) {
             *value = Complexes { re: [unit.re; WIDTH], im: [unit.im; WIDTH] };
         }
+        let Self { matrix, rows, plan, found, exchanged, column, .. } = self;
+        let lists = if *exchanged { found } else { plan };
         for i in 0..n {
-            let row = self.rows[i];
-            let mut sum = Complex::<V>::load(&self.column[i]);
-            let mut k = self.next(i, row, 0);
-            while k < i.min(skip) {
-                let l = Complex::load(&self.matrix[row * n + k]);
-                sum = sum.subtract_product(l, Complex::load(&self.column[k]));
-                k = self.next(i, row, k + 1);
+            let mut sum = Complex::<V>::load(&column[i]);
+            let row = &matrix[rows[i] * n..][..n];
+            for &k in lists.lower.get(rows[i]) {
+                sum = sum.subtract_product(Complex::load(&row[k]), Complex::load(&column[k]));
             }
-            sum.store(&mut self.column[i]);
+            sum.store(&mut column[i]);
         }
         self.solve_lower::<V>(n - skip);
         // … and with U from the last, |U||v| beside it.
+        let Self { matrix, rows, plan, found, exchanged, column, .. } = self;
+        let lists = if *exchanged { found } else { plan };
+        let factors = Factors { matrix, rows, lists, sparse: skip };
+        let [of_right, of_left, of_factors] = &mut self.moduli;
         let mut across = Complex::<V>::splat(0.0, 0.0);
         for k in (0..n).rev() {
-            let row = self.rows[k];
-            let mut sum = Complex::<V>::load(&self.column[k]);
-            let mut weight = V::splat(0.0);
-            let mut j = self.next(k, row, k + 1);
-            while j < n {
-                let u = Complex::<V>::load(&self.matrix[row * n + j]);
-                sum = sum.subtract_product(u, Complex::load(&self.column[j]));
-                weight = modulus(u).mul_add(V::load(&self.moduli[0][j]), weight);
-                j = self.next(k, row, j + 1);
-            }
-            let inverse = Complex::<V>::load(&self.matrix[row * n + k]);
+            let sum = Complex::<V>::load(&column[k]);
+            let sum = factors.without_right(k, sum, column);
+            let weight = factors.moduli_right::<V>(k, of_right);
+            let inverse = Complex::<V>::load(&factors.row(k)[k]);
             let v = sum.mul(inverse);
-            v.store(&mut self.column[k]);
+            v.store(&mut column[k]);
             v.store(&mut self.right[k]);
-            modulus(v).store(&mut self.moduli[0][k]);
+            modulus(v).store(&mut of_right[k]);
             let own = modulus(v).mul(modulus(inverse.reciprocal()));
-            own.add(weight).store(&mut self.moduli[2][k]);
+            own.add(weight).store(&mut of_factors[k]);
             let b = self.probe[n - 1 - k];
             across = across.add(Complex::splat(b.re, b.im).mul(v));
         }
         // |L||U||v|.
         for i in (0..n).rev() {
-            let row = self.rows[i];
-            let mut sum = V::load(&self.moduli[2][i]);
-            let mut k = self.next(i, row, 0);
-            while k < i {
-                let l = modulus(Complex::<V>::load(&self.matrix[row * n + k]));
-                sum = l.mul_add(V::load(&self.moduli[2][k]), sum);
-                k = self.next(i, row, k + 1);
-            }
-            sum.store(&mut self.moduli[2][i]);
+            let sum = V::load(&of_factors[i]);
+            factors.moduli_left(i, sum, of_factors).store(&mut of_factors[i]);
         }
         // y: with Uᵀ from the first place, then with Lᵀ from the last.
-        for (k, value) in self.column.iter_mut().enumerate() {
+        for (k, value) in column.iter_mut().enumerate() {
             let unit = self.probe[n - 1 - k];
             *value = Complexes { re: [unit.re; WIDTH], im: [unit.im; WIDTH] };
         }
         for i in 0..n {
-            let row = self.rows[i];
-            let inverse = Complex::load(&self.matrix[row * n + i]);
-            let a = Complex::<V>::load(&self.column[i]).mul(inverse);
-            a.store(&mut self.column[i]);
-            let mut k = self.next(i, row, i + 1);
-            while k < n {
-                let value = Complex::<V>::load(&self.column[k]);
-                let u = Complex::load(&self.matrix[row * n + k]);
-                value.subtract_product(a, u).store(&mut self.column[k]);
-                k = self.next(i, row, k + 1);
-            }
+            let inverse = Complex::load(&factors.row(i)[i]);
+            let a = Complex::<V>::load(&column[i]).mul(inverse);
+            a.store(&mut column[i]);
+            factors.spread_right(i, a, column);
         }
         let mut eliminated = V::splat(0.0);
         for i in (0..n).rev() {
-            let row = self.rows[i];
-            let b = Complex::<V>::load(&self.column[i]);
-            let mut k = self.next(i, row, 0);
-            while k < i {
-                let value = Complex::<V>::load(&self.column[k]);
-                let l = Complex::load(&self.matrix[row * n + k]);
-                value.subtract_product(b, l).store(&mut self.column[k]);
-                k = self.next(i, row, k + 1);
-            }
+            let b = Complex::<V>::load(&column[i]);
+            factors.spread_left(i, b, column);
             let size = modulus(b);
-            eliminated = size.mul_add(V::load(&self.moduli[2][i]), eliminated);
+            eliminated = size.mul_add(V::load(&of_factors[i]), eliminated);
             let mut stored = [0.0; WIDTH];
             size.store(&mut stored);
             for (lane, size) in stored.into_iter().enumerate() {
                 let row = usize::from(self.origin[i][lane]);
-                self.moduli[1][row][lane] = size;
-                self.left[row].re[lane] = self.column[i].re[lane];
-                self.left[row].im[lane] = self.column[i].im[lane];
+                of_left[row][lane] = size;
+                self.left[row].re[lane] = column[i].re[lane];
+                self.left[row].im[lane] = column[i].im[lane];
             }
         }
         let mut entered = V::splat(0.0);
-        for i in 0..n {
+        for (i, size) in of_left.iter().enumerate() {
             let mut sum = V::splat(0.0);
-            let mut j = self.structure.next(i, 0);
-            while j < n {
-                sum = V::load(&self.doubt[i * n + j]).mul_add(V::load(&self.moduli[0][j]), sum);
-                j = self.structure.next(i, j + 1);
+            for &j in self.elements.get(i) {
+                sum = V::load(&self.doubt[i * n + j]).mul_add(V::load(&of_right[j]), sum);
             }
-            entered = sum.mul_add(V::load(&self.moduli[1][i]), entered);
+            entered = sum.mul_add(V::load(size), entered);
         }
         let unit = 0.5 * f64::EPSILON;
         let count = n as f64;
@@ -640,6 +728,130 @@ impl Elimination {
         let mut error = [0.0; WIDTH];
         relative.add(V::splat(32.0 * count * unit)).store(&mut error);
         error
+    }
+}
+
+/// Factors, read by place.
+struct Factors<'a> {
+    matrix: &'a [Complexes],
+    rows: &'a [usize],
+    lists: &'a Lists,
+    sparse: usize,
+}
+
+impl Factors<'_> {
+    #[inline(always)]
+    fn row(&self, place: usize) -> &[Complexes] {
+        let n = self.rows.len();
+        &self.matrix[self.rows[place] * n..][..n]
+    }
+
+    /// Sparse columns on the left of the diagonal; the first of the dense ones.
+    #[inline(always)]
+    fn left(&self, place: usize) -> (&[usize], usize) {
+        (self.lists.lower.get(self.rows[place]), self.sparse.min(place))
+    }
+
+    /// Columns of a sparse row on the right of the diagonal; the first of the dense ones of a dense row.
+    #[inline(always)]
+    fn right(&self, place: usize) -> (&[usize], usize) {
+        let dense = if place < self.sparse { self.rows.len() } else { place + 1 };
+        (self.lists.upper.get(self.rows[place]), dense)
+    }
+
+    /// `sum − Σ l_ik x_k`.
+    #[inline(always)]
+    fn without_left<V: Vector>(
+        &self,
+        place: usize,
+        mut sum: Complex<V>,
+        x: &[Complexes],
+    ) -> Complex<V> {
+        let row = self.row(place);
+        let (listed, first) = self.left(place);
+        for &k in listed {
+            sum = sum.subtract_product(Complex::load(&row[k]), Complex::load(&x[k]));
+        }
+        for (l, x) in row[first..place].iter().zip(&x[first..place]) {
+            sum = sum.subtract_product(Complex::load(l), Complex::load(x));
+        }
+        sum
+    }
+
+    /// `sum − Σ u_kj x_j`.
+    #[inline(always)]
+    fn without_right<V: Vector>(
+        &self,
+        place: usize,
+        mut sum: Complex<V>,
+        x: &[Complexes],
+    ) -> Complex<V> {
+        let row = self.row(place);
+        let (listed, first) = self.right(place);
+        for &j in listed {
+            sum = sum.subtract_product(Complex::load(&row[j]), Complex::load(&x[j]));
+        }
+        for (u, x) in row[first..].iter().zip(&x[first..]) {
+            sum = sum.subtract_product(Complex::load(u), Complex::load(x));
+        }
+        sum
+    }
+
+    /// `x_k −= l_ik b`.
+    #[inline(always)]
+    fn spread_left<V: Vector>(&self, place: usize, b: Complex<V>, x: &mut [Complexes]) {
+        let row = self.row(place);
+        let (listed, first) = self.left(place);
+        for &k in listed {
+            let value = Complex::<V>::load(&x[k]);
+            value.subtract_product(b, Complex::load(&row[k])).store(&mut x[k]);
+        }
+        for (l, x) in row[first..place].iter().zip(&mut x[first..place]) {
+            Complex::<V>::load(x).subtract_product(b, Complex::load(l)).store(x);
+        }
+    }
+
+    /// `x_j −= u_kj a`.
+    #[inline(always)]
+    fn spread_right<V: Vector>(&self, place: usize, a: Complex<V>, x: &mut [Complexes]) {
+        let row = self.row(place);
+        let (listed, first) = self.right(place);
+        for &j in listed {
+            let value = Complex::<V>::load(&x[j]);
+            value.subtract_product(a, Complex::load(&row[j])).store(&mut x[j]);
+        }
+        for (u, x) in row[first..].iter().zip(&mut x[first..]) {
+            Complex::<V>::load(x).subtract_product(a, Complex::load(u)).store(x);
+        }
+    }
+
+    /// `sum + Σ |l_ik| x_k`.
+    #[inline(always)]
+    fn moduli_left<V: Vector>(&self, place: usize, mut sum: V, x: &[[f64; WIDTH]]) -> V {
+        let row = self.row(place);
+        let (listed, first) = self.left(place);
+        for &k in listed {
+            sum = modulus(Complex::<V>::load(&row[k])).mul_add(V::load(&x[k]), sum);
+        }
+        for (l, x) in row[first..place].iter().zip(&x[first..place]) {
+            sum = modulus(Complex::<V>::load(l)).mul_add(V::load(x), sum);
+        }
+        sum
+    }
+
+    /// `Σ |u_kj| x_j`.
+    #[inline(always)]
+    fn moduli_right<V: Vector>(&self, place: usize, x: &[[f64; WIDTH]]) -> V {
+        let mut sum = V::splat(0.0);
+        let row = self.row(place);
+        let (listed, first) = self.right(place);
+        for &j in listed {
+            sum = modulus(Complex::<V>::load(&row[j])).mul_add(V::load(&x[j]), sum);
+        }
+        for (u, x) in row[first..].iter().zip(&x[first..]) {
+            sum = modulus(Complex::<V>::load(u)).mul_add(V::load(x), sum);
+        }
+        sum
     }
 }
 

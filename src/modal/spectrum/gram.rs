@@ -11,8 +11,8 @@ use super::lanes::{Complex, Complexes, Vector, WIDTH};
 use super::reduction::{BLOCK, Reduction};
 use super::scaled::Product;
 
-/// Rows of a block of G that is summed at once.
-const ROWS: usize = 2;
+/// Elements of G that are summed at once: as many as registers hold, real and imaginary parts.
+const PAIRS: usize = 12;
 /// Roundings of e: three terms and their sum.
 const ROUNDINGS: f64 = 4.0;
 
@@ -25,9 +25,17 @@ pub struct Gram {
     moduli: Vec<[f64; WIDTH]>,
     /// What rounding may have done to each e, in units of the unit roundoff.
     doubt: Vec<[f64; WIDTH]>,
+    /// The motions for which the products are.
+    motions: Vec<f64>,
+    /// Row and column of the elements of G on and above its diagonal, and for each block of them and each elastic
+    /// coordinate the products of the two motions; zeros end the last block.
+    pairs: Vec<[usize; 2]>,
+    products: Vec<[f64; PAIRS]>,
+    /// Squares of the motions.
+    squares: Vec<f64>,
     /// G, row by row.
     pub elements: Vec<Complexes>,
-    /// `Σ B² |1/e|` of each motion: no element of a row and column is greater than the root of their product.
+    /// Roots of `Σ B² |1/e|` of each motion: no element of a row and column is greater than their product.
     pub sizes: Vec<[f64; WIDTH]>,
 }
 
@@ -41,6 +49,30 @@ impl Gram {
         self.doubt.resize(modes, [0.0; WIDTH]);
         self.elements.resize(stride * stride, Complexes::ZERO);
         self.sizes.resize(stride, [0.0; WIDTH]);
+        if self.motions != reduction.motions || self.pairs.last() != Some(&[reduction.count - 1; 2])
+        {
+            self.multiply(reduction);
+        }
+    }
+
+    /// Products of motions.
+    fn multiply(&mut self, reduction: &Reduction) {
+        self.motions.clone_from(&reduction.motions);
+        self.pairs.clear();
+        let count = reduction.count;
+        self.pairs.extend((0..count).flat_map(|row| (row..count).map(move |column| [row, column])));
+        self.squares.clear();
+        self.squares.extend(self.motions.iter().map(|motion| motion * motion));
+        self.products.clear();
+        for pairs in self.pairs.chunks(PAIRS) {
+            for row in self.motions.chunks_exact(self.stride) {
+                let mut products = [0.0; PAIRS];
+                for (product, &[i, j]) in products.iter_mut().zip(pairs) {
+                    *product = row[i] * row[j];
+                }
+                self.products.push(products);
+            }
+        }
     }
 
     /// Forms G at frequencies with these powers s², s and 1 and their moduli; the product of all e.
@@ -64,59 +96,56 @@ impl Gram {
             let square = value.square();
             let value = Complex::where_greater(square, least.re.mul(least.re), value, least);
             product.times(value);
-            let inverse = V::splat(1.0).div(value.square());
+            let inverse = value.square().reciprocal();
             let minus = V::splat(0.0).sub(inverse);
             let weight = Complex { re: value.re.mul(inverse), im: value.im.mul(minus) };
             weight.store(&mut self.weights[mode]);
-            inverse.sqrt().store(&mut self.moduli[mode]);
+            inverse.root_above().store(&mut self.moduli[mode]);
             size.mul(V::splat(ROUNDINGS)).store(&mut self.doubt[mode]);
         }
-        self.measure::<V>(&reduction.motions);
-        for row in (0..self.stride).step_by(ROWS) {
-            for column in (row / BLOCK * BLOCK..self.stride).step_by(BLOCK) {
-                self.block::<V>(&reduction.motions, row, column);
-            }
+        self.measure::<V>();
+        for block in 0..self.pairs.len().div_ceil(PAIRS) {
+            self.block::<V>(block);
         }
         product
     }
 
     #[inline(always)]
-    fn measure<V: Vector>(&mut self, motions: &[f64]) {
+    fn measure<V: Vector>(&mut self) {
         for first in (0..self.stride).step_by(BLOCK) {
             let mut sums = [V::splat(0.0); BLOCK];
-            for (row, size) in motions.chunks_exact(self.stride).zip(&self.moduli) {
+            for (row, size) in self.squares.chunks_exact(self.stride).zip(&self.moduli) {
                 let size = V::load(size);
+                let row = &row[first..first + BLOCK];
                 for i in 0..BLOCK {
-                    let motion = row[first + i];
-                    sums[i] = V::splat(motion * motion).mul_add(size, sums[i]);
+                    sums[i] = V::splat(row[i]).mul_add(size, sums[i]);
                 }
             }
             for i in 0..BLOCK {
-                sums[i].store(&mut self.sizes[first + i]);
+                sums[i].root_above().store(&mut self.sizes[first + i]);
             }
         }
     }
 
     /// A block of G and its mirror image.
     #[inline(always)]
-    fn block<V: Vector>(&mut self, motions: &[f64], row: usize, column: usize) {
-        let mut sums = [[Complex::<V>::splat(0.0, 0.0); BLOCK]; ROWS];
-        for (motions, weight) in motions.chunks_exact(self.stride).zip(&self.weights) {
+    fn block<V: Vector>(&mut self, block: usize) {
+        let mut sums = [Complex::<V>::splat(0.0, 0.0); PAIRS];
+        let modes = self.weights.len();
+        for (products, weight) in self.products[block * modes..].iter().zip(&self.weights) {
             let weight = Complex::<V>::load(weight);
-            let columns = &motions[column..column + BLOCK];
-            let rows = &motions[row..row + ROWS];
-            for i in 0..ROWS {
-                let scaled = weight.scale(V::splat(rows[i]));
-                for j in 0..BLOCK {
-                    sums[i][j] = sums[i][j].add_real_product(V::splat(columns[j]), scaled);
-                }
+            for i in 0..PAIRS {
+                sums[i] = sums[i].add_real_product(V::splat(products[i]), weight);
             }
         }
-        for i in 0..ROWS {
-            for j in 0..BLOCK {
-                sums[i][j].store(&mut self.elements[(row + i) * self.stride + column + j]);
-                sums[i][j].store(&mut self.elements[(column + j) * self.stride + row + i]);
-            }
+        // By way of memory: an index that is not known would keep the sums there all along.
+        let mut stored = [Complexes::ZERO; PAIRS];
+        for i in 0..PAIRS {
+            sums[i].store(&mut stored[i]);
+        }
+        for (sum, &[row, column]) in stored.iter().zip(&self.pairs[block * PAIRS..]) {
+            self.elements[row * self.stride + column] = *sum;
+            self.elements[column * self.stride + row] = *sum;
         }
     }
 
@@ -124,20 +153,6 @@ impl Gram {
     #[inline(always)]
     pub fn weight<V: Vector>(&self, mode: usize) -> Complex<V> {
         Complex::load(&self.weights[mode])
-    }
-
-    /// The elastic coordinate `bᵀ f/e`, b its row of motions and f forces on these.
-    #[inline(always)]
-    pub fn elastic<V: Vector>(&self, row: &[f64], mode: usize, forces: &[Complexes]) -> Complex<V> {
-        let row = &row[..forces.len()];
-        let mut sums = [Complex::<V>::splat(0.0, 0.0); 2];
-        for (pair, forces) in row.chunks(2).zip(forces.chunks(2)) {
-            for i in 0..forces.len() {
-                let force = Complex::load(&forces[i]);
-                sums[i] = sums[i].add_real_product(V::splat(pair[i]), force);
-            }
-        }
-        sums[0].add(sums[1]).mul(Complex::load(&self.weights[mode]))
     }
 
     /// What rounding of the e may do to a determinant near zero, in units of the unit roundoff and of it: with the
@@ -152,13 +167,53 @@ impl Gram {
     ) -> V {
         let mut own = V::splat(0.0);
         let mut shared = V::splat(0.0);
-        for (mode, row) in motions.chunks_exact(self.stride).enumerate() {
-            let doubt = V::load(&self.doubt[mode]);
-            let product = self.elastic::<V>(row, mode, right);
-            let product = product.mul(self.elastic::<V>(row, mode, left));
-            shared = doubt.mul_add(product.square().sqrt(), shared);
-            own = doubt.mul_add(V::load(&self.moduli[mode]), own);
+        let modes = self.weights.len();
+        for first in (0..modes).step_by(BLOCK) {
+            let right = forces_on::<V>(motions, self.stride, first, right);
+            let left = forces_on::<V>(motions, self.stride, first, left);
+            for i in 0..BLOCK {
+                let mode = first + i;
+                if mode == modes {
+                    break;
+                }
+                // |bᵀf/e| of both.
+                let doubt = V::load(&self.doubt[mode]);
+                let size = V::load(&self.moduli[mode]);
+                let product = right[i].mul(left[i]).square().root_above();
+                shared = doubt.mul(size.mul(size)).mul_add(product, shared);
+                own = doubt.mul_add(size, own);
+            }
         }
         own.add(shared.div(across))
     }
+}
+
+/// The forces `bᵀ f` on a block of elastic coordinates, b their rows of motions and f forces on these; beyond the last
+/// coordinate those on it.
+#[inline(always)]
+pub fn forces_on<V: Vector>(
+    motions: &[f64],
+    stride: usize,
+    first: usize,
+    forces: &[Complexes],
+) -> [Complex<V>; BLOCK] {
+    let (count, last) = (forces.len(), motions.len() / stride - 1);
+    let mut starts = [0; BLOCK];
+    for i in 0..BLOCK {
+        starts[i] = (first + i).min(last) * stride;
+    }
+    let rows = [
+        &motions[starts[0]..][..count],
+        &motions[starts[1]..][..count],
+        &motions[starts[2]..][..count],
+        &motions[starts[3]..][..count],
+    ];
+    let mut sums = [Complex::<V>::splat(0.0, 0.0); BLOCK];
+    for at in 0..count {
+        let force = Complex::<V>::load(&forces[at]);
+        for i in 0..BLOCK {
+            sums[i] = sums[i].add_real_product(V::splat(rows[i][at]), force);
+        }
+    }
+    sums
 }

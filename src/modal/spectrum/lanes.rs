@@ -1,8 +1,8 @@
 //! Eight numbers at a time: the one file that knows instruction sets.
 //!
 //! Kernels are written once over [`Vector`] and compiled for AVX-512, AVX2 with FMA and portable code; which one
-//! runs is found out when the program runs. Lanes never mix, so that AVX-512 and AVX2 give the same
-//! bits; the portable form rounds products that the others do not, and agrees within the error bounds.
+//! runs is found out when the program runs. Lanes never mix. The portable form rounds products that the others do
+//! not, and AVX-512 has reciprocals of its own: instruction sets agree within the error bounds.
 //!
 //! The crate's unsafe code is all here; `scripts/nightly` runs its tests under Miri and a sanitizer.
 #![cfg_attr(
@@ -62,6 +62,20 @@ pub trait Vector: Copy {
     fn sqrt(self) -> Self;
     /// `yes` where this is greater than `other`, else `no`.
     fn where_greater(self, other: Self, yes: Self, no: Self) -> Self;
+    /// Whether any lane is greater than that of `other`.
+    fn any_greater(self, other: Self) -> bool;
+    /// 1/self to two units in the last place, of numbers between 1e-300 and 1e300 in modulus; not finite, or zero, beyond.
+    #[inline(always)]
+    fn reciprocal(self) -> Self {
+        Self::splat(1.0).div(self)
+    }
+    /// The square root of a number that is not negative, or up to a thousandth more: what bounds need. At least 1e-154;
+    /// NaN of NaN, NaN or infinite of what is infinite.
+    #[inline(always)]
+    fn root_above(self) -> Self {
+        let least = Self::splat(f64::MIN_POSITIVE);
+        least.where_greater(self, least, self).sqrt()
+    }
     /// Binary exponent of positive normal numbers below 2¹⁰²³, and the reciprocal of their power of two.
     fn exponent(self) -> (Self, Self);
     /// Absolute value.
@@ -128,6 +142,15 @@ impl<V: Vector> Complex<V> {
         Self {
             re: a.im.mul_add(b.im, a.re.negative_mul_add(b.re, self.re)),
             im: a.im.negative_mul_add(b.re, a.re.negative_mul_add(b.im, self.im)),
+        }
+    }
+
+    /// `self + a · b`.
+    #[inline(always)]
+    pub fn add_product(self, a: Self, b: Self) -> Self {
+        Self {
+            re: a.im.negative_mul_add(b.im, a.re.mul_add(b.re, self.re)),
+            im: a.im.mul_add(b.re, a.re.mul_add(b.im, self.im)),
         }
     }
 
@@ -223,6 +246,10 @@ impl Vector for Portable {
     fn where_greater(self, other: Self, yes: Self, no: Self) -> Self {
         let of = |lane: usize| if self.0[lane] > other.0[lane] { yes.0[lane] } else { no.0[lane] };
         Self(std::array::from_fn(of))
+    }
+    #[inline(always)]
+    fn any_greater(self, other: Self) -> bool {
+        (0..WIDTH).any(|lane| self.0[lane] > other.0[lane])
     }
     #[inline(always)]
     fn exponent(self) -> (Self, Self) {
@@ -390,6 +417,21 @@ mod x86 {
                 Self(_mm256_blendv_pd(no.0, yes.0, low), _mm256_blendv_pd(no.1, yes.1, high))
             }
         }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            unsafe {
+                let sign = _mm256_set1_pd(-0.0);
+                Self(_mm256_andnot_pd(sign, self.0), _mm256_andnot_pd(sign, self.1))
+            }
+        }
+        #[inline(always)]
+        fn any_greater(self, other: Self) -> bool {
+            unsafe {
+                let low = _mm256_cmp_pd::<_CMP_GT_OQ>(self.0, other.0);
+                let high = _mm256_cmp_pd::<_CMP_GT_OQ>(self.1, other.1);
+                _mm256_movemask_pd(_mm256_or_pd(low, high)) != 0
+            }
+        }
     }
 
     #[inline(always)]
@@ -464,6 +506,37 @@ mod x86 {
             unsafe {
                 let greater = _mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0);
                 Self(_mm512_mask_blend_pd(greater, no.0, yes.0))
+            }
+        }
+        #[inline(always)]
+        fn any_greater(self, other: Self) -> bool {
+            unsafe { _mm512_cmp_pd_mask::<_CMP_GT_OQ>(self.0, other.0) != 0 }
+        }
+        #[inline(always)]
+        fn abs(self) -> Self {
+            unsafe { Self(_mm512_abs_pd(self.0)) }
+        }
+        /// Newton's iteration twice, from 14 bits.
+        #[inline(always)]
+        fn reciprocal(self) -> Self {
+            unsafe {
+                let one = _mm512_set1_pd(1.0);
+                let mut reciprocal = _mm512_rcp14_pd(self.0);
+                for _ in 0..2 {
+                    let lacking = _mm512_fnmadd_pd(self.0, reciprocal, one);
+                    reciprocal = _mm512_fmadd_pd(reciprocal, lacking, reciprocal);
+                }
+                Self(reciprocal)
+            }
+        }
+        /// From 14 bits of the reciprocal root.
+        #[inline(always)]
+        fn root_above(self) -> Self {
+            unsafe {
+                // The second operand where one is NaN.
+                let value = _mm512_max_pd(_mm512_set1_pd(f64::MIN_POSITIVE), self.0);
+                let root = _mm512_mul_pd(value, _mm512_rsqrt14_pd(value));
+                Self(_mm512_mul_pd(root, _mm512_set1_pd(1.0 + 1.0 / 8192.0)))
             }
         }
     }
@@ -624,6 +697,53 @@ mod tests {
         }
     }
 
+    struct Estimates([[f64; WIDTH]; 2]);
+
+    impl Kernel for Estimates {
+        type Output = ([[f64; WIDTH]; 2], bool);
+
+        #[inline(always)]
+        fn run<V: Vector>(self) -> Self::Output {
+            let [a, b] = self.0.each_ref().map(V::load);
+            ([a.reciprocal(), a.root_above()].map(stored), a.any_greater(b))
+        }
+    }
+
+    #[test]
+    fn reciprocals_and_roots_above_are_what_they_promise_on_every_level() {
+        for level in comparing() {
+            for exponent in (-300..=300).step_by(if cfg!(miri) { 60 } else { 1 }) {
+                let power = 10_f64.powi(exponent);
+                let values = from_fn(|i| power * (1.0 + 0.37 * i as f64));
+                let ([reciprocals, roots], _) = level.run(Estimates([values; 2]));
+                for lane in 0..WIDTH {
+                    let error = reciprocals[lane].mul_add(values[lane], -1.0);
+                    assert!(error.abs() <= 2.0 * f64::EPSILON, "{level:?} {:e}", values[lane]);
+                    let ratio = roots[lane] / values[lane].sqrt();
+                    assert!((1.0..1.001).contains(&ratio), "{level:?} {:e}", values[lane]);
+                }
+            }
+            let special = [0.0, 1e-320, f64::NAN, f64::INFINITY, 1.0, 4.0, 9.0, 16.0];
+            let ([reciprocals, roots], _) = level.run(Estimates([special; 2]));
+            assert!(roots[..2].iter().all(|root| *root > 0.0 && *root < 1e-150), "{level:?}");
+            assert!(!roots[2].is_finite() && !roots[3].is_finite(), "{level:?}");
+            assert!(!reciprocals[0].is_finite() && !reciprocals[2].is_finite(), "{level:?}");
+        }
+    }
+
+    #[test]
+    fn one_greater_lane_is_found_wherever_it_is() {
+        for level in comparing() {
+            let of = |a, b| level.run(Estimates([a, b])).1;
+            assert!(!of([1.0; WIDTH], [1.0; WIDTH]) && !of([f64::NAN; WIDTH], [1.0; WIDTH]));
+            for lane in 0..WIDTH {
+                let mut one = [1.0; WIDTH];
+                one[lane] = 2.0;
+                assert!(of(one, [1.0; WIDTH]) && !of([1.0; WIDTH], one), "{level:?} {lane}");
+            }
+        }
+    }
+
     struct Exponent([f64; WIDTH]);
 
     impl Kernel for Exponent {
@@ -657,7 +777,7 @@ mod tests {
     struct ComplexArithmetic([Complexes; 3]);
 
     impl Kernel for ComplexArithmetic {
-        type Output = [Complexes; 9];
+        type Output = [Complexes; 10];
 
         #[inline(always)]
         fn run<V: Vector>(self) -> Self::Output {
@@ -668,6 +788,7 @@ mod tests {
                 a.sub(b),
                 a.mul(b),
                 c.subtract_product(a, b),
+                c.add_product(a, b),
                 c.add_real_product(a.re, b),
                 a.scale(b.im),
                 Complex { re: a.square(), im: a.im },
@@ -697,6 +818,7 @@ mod tests {
                 each(&|a, b, _| a - b),
                 each(&|a, b, _| a * b),
                 each(&|a, b, c| c - a * b),
+                each(&|a, b, c| c + a * b),
                 each(&|a, b, c| c + a.re * b),
                 each(&|a, b, _| a * b.im),
                 each(&|a, _, _| c64::new(a.norm_sqr(), a.im)),

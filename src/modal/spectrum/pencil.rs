@@ -11,10 +11,10 @@
 )]
 
 use super::elimination::{Determinants, Elimination};
-use super::gram::Gram;
+use super::gram::{Gram, forces_on};
 use super::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
 use super::reduction::{BLOCK, MOST_MOTIONS, Reduction};
-use super::scaled::{self, Product, Scaled};
+use super::scaled::{Product, Scaled};
 use crate::dynamics::Model;
 use faer::c64;
 
@@ -448,11 +448,16 @@ impl Pencil {
             Complex::<V>::load(&self.elimination.left[i]).scale(rows).store(&mut left[i]);
         }
         let minus = V::splat(-1.0);
-        let rows = self.reduction.motions.chunks_exact(self.reduction.stride);
-        for (mode, row) in rows.enumerate() {
-            let value = self.gram.elastic::<V>(row, mode, &self.forces[0]).scale(minus);
-            value.store(&mut right[others + mode]);
-            self.gram.elastic::<V>(row, mode, &self.forces[1]).store(&mut left[others + mode]);
+        let Reduction { motions, stride, own, .. } = &self.reduction;
+        for first in (0..own.len()).step_by(BLOCK) {
+            let from_right = forces_on::<V>(motions, *stride, first, &self.forces[0]);
+            let from_left = forces_on::<V>(motions, *stride, first, &self.forces[1]);
+            for i in 0..BLOCK.min(own.len() - first) {
+                let (mode, place) = (first + i, others + first + i);
+                let weight = self.gram.weight::<V>(mode);
+                from_right[i].mul(weight).scale(minus).store(&mut right[place]);
+                from_left[i].mul(weight).store(&mut left[place]);
+            }
         }
     }
 
@@ -492,7 +497,7 @@ impl Pencil {
         mut to: [&mut [Complexes]; N],
     ) {
         let others = self.order.len();
-        let (elastic, stride) = (&x[others..], self.reduction.stride);
+        let elastic = &x[others..];
         self.see::<V>(elastic, false, &mut core[others..]);
         core[..others].copy_from_slice(&x[..others]);
         // Sums over others gather in `to`, forces on motions beside.
@@ -510,21 +515,19 @@ impl Pencil {
                     true => &mut to[n][into],
                     false => &mut forces[n][into - others],
                 };
-                Complex::<V>::load(sum).add(value.mul(x)).store(sum);
+                Complex::<V>::load(sum).add_product(value, x).store(sum);
             }
         }
-        let count = self.reduction.count;
-        let rows = self.reduction.motions.chunks_exact(stride);
-        for (mode, row) in rows.enumerate() {
-            let x = Complex::<V>::load(&elastic[mode]);
+        let Reduction { count, stride, own, motions, .. } = &self.reduction;
+        for first in (0..own.len()).step_by(BLOCK) {
             for n in 0..N {
-                let own = value::<V>(self.reduction.own[mode], at[n].powers[0][0]);
-                let mut sum = own.mul(x);
-                let forces = &forces[n][..count];
-                for i in 0..count {
-                    sum = sum.add_real_product(V::splat(row[i]), Complex::load(&forces[i]));
+                let sums = forces_on::<V>(motions, *stride, first, &forces[n][..*count]);
+                for i in 0..BLOCK.min(own.len() - first) {
+                    let mode = first + i;
+                    let own = value::<V>(own[mode], at[n].powers[0][0]);
+                    let sum = sums[i].add_product(own, Complex::load(&elastic[mode]));
+                    sum.store(&mut to[n][others + mode]);
                 }
-                sum.store(&mut to[n][others + mode]);
             }
         }
         let Some(factors) = full else { return };
@@ -554,8 +557,8 @@ impl Pencil {
             let value = Complex::<V>::load(&solution[j]);
             for at in self.first[j]..self.first[j + 1] {
                 let sum = &mut forces[self.rows[at]];
-                let product = Complex::<V>::load(&self.values[at]).mul(value);
-                Complex::<V>::load(sum).add(product).store(sum);
+                let entry = Complex::load(&self.values[at]);
+                Complex::<V>::load(sum).add_product(entry, value).store(sum);
             }
         }
         for i in 0..others {
@@ -600,11 +603,14 @@ impl Pencil {
     /// `(r + sign Bᵀ f)/e`, in place.
     #[inline(always)]
     fn substitute<V: Vector>(&self, forces: &[Complexes], sign: V, r: &mut [Complexes]) {
-        let rows = self.reduction.motions.chunks_exact(self.reduction.stride);
-        for (mode, row) in rows.enumerate() {
-            let force = self.gram.elastic::<V>(row, mode, forces).scale(sign);
-            let own = Complex::<V>::load(&r[mode]).mul(self.gram.weight::<V>(mode));
-            own.add(force).store(&mut r[mode]);
+        let Reduction { motions, stride, own, .. } = &self.reduction;
+        for first in (0..own.len()).step_by(BLOCK) {
+            let forces = forces_on::<V>(motions, *stride, first, forces);
+            for i in 0..BLOCK.min(own.len() - first) {
+                let r = &mut r[first + i];
+                let sum = Complex::<V>::load(r).add_real_product(sign, forces[i]);
+                sum.mul(self.gram.weight::<V>(first + i)).store(r);
+            }
         }
     }
 
@@ -625,9 +631,10 @@ impl Pencil {
                 Some(mode) => modulus::<V>(self.reduction.own[mode], at.moduli[0][0]),
                 None => modulus::<V>(self.entries[i * self.size + i], at.moduli[0][self.degree[i]]),
             };
-            let y = Complex::<V>::load(&left[i]).square().sqrt();
-            let x = Complex::<V>::load(&right[i]).square().sqrt();
-            first = y.mul_add(Complex::<V>::load(&residual[i]).square().sqrt(), first);
+            let y = Complex::<V>::load(&left[i]).square().root_above();
+            let x = Complex::<V>::load(&right[i]).square().root_above();
+            let r = Complex::<V>::load(&residual[i]).square().root_above();
+            first = y.mul_add(r, first);
             size = own.mul(y).mul_add(x, size);
         }
         // Own terms, the forces that balance them, and sums over motions and the full part.
@@ -754,8 +761,9 @@ impl Kernel for Evaluate<'_> {
         let pencil = self.pencil;
         let (n, others) = (pencil.size, pencil.order.len());
         let at = Frequencies::<V>::new(self.points, pencil.typical);
-        let mut exponent = [0; WIDTH];
-        scale(pencil, &at, &mut exponent);
+        let mut exponents = [0.0; WIDTH];
+        scale(pencil, &at).store(&mut exponents);
+        let exponent = exponents.map(|exponent| -exponent as i64);
         let product = match pencil.reduction.count == 0 {
             true => Product::new(),
             false => pencil.gram.form::<V>(&pencil.reduction, at.powers[0][0], at.moduli[0][0]),
@@ -764,8 +772,8 @@ impl Kernel for Evaluate<'_> {
         for i in 0..others {
             let kind = usize::from(i < pencil.states);
             let row_scale = V::load(&pencil.lanes[0][i]);
-            let mut j = pencil.elimination.element(i, 0);
-            while j < n {
+            for at_element in 0..pencil.elimination.elements(i).len() {
+                let j = pencil.elimination.elements(i)[at_element];
                 let entry = pencil.entries[i * n + j];
                 let factor = row_scale.mul(V::load(&pencil.lanes[1][j]));
                 let degree = pencil.degree[j];
@@ -774,7 +782,6 @@ impl Kernel for Evaluate<'_> {
                 // Each term of an element is rounded a few times.
                 let size = modulus::<V>(entry, at.moduli[kind][degree]).mul(factor);
                 size.mul(V::splat(4.0)).store(&mut pencil.elimination.doubt[i * n + j]);
-                j = pencil.elimination.element(i, j + 1);
             }
         }
         if pencil.reduction.count == 0 {
@@ -800,12 +807,14 @@ impl Kernel for Evaluate<'_> {
     }
 }
 
-/// Scales of each lane, powers of two: those of the typical modulus, moved with the diagonal. Takes the exponents that
-/// the determinants lack.
+/// Scales of each lane, powers of two: those of the typical modulus, moved with the diagonal. The sum of their
+/// exponents, which the determinants lack.
 #[inline(always)]
-fn scale<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>, exponent: &mut [i64; WIDTH]) {
+fn scale<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) -> V {
     let ratio = at.modulus.mul(V::splat(1.0 / pencil.typical));
-    let lacking = [V::splat(1.0), ratio, ratio.mul(ratio)];
+    let roots = [V::splat(1.0), ratio.root_above(), ratio];
+    let over = roots.map(V::reciprocal);
+    let mut exponents = V::splat(0.0);
     for i in 0..pencil.order.len() {
         let degree = pencil.degree[i];
         let entry = pencil.entries[i * pencil.size + i];
@@ -813,18 +822,24 @@ fn scale<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>, exponent: &mut [i6
         let typical = entry[0].abs() * m + entry[1].abs() * d + entry[2].abs() * k;
         let kind = usize::from(i < pencil.states);
         let diagonal = modulus::<V>(entry, at.moduli[kind][degree]);
-        let moved = if typical > 0.0 { V::splat(typical).div(diagonal) } else { V::splat(1.0) };
-        let row = moved.div(lacking[degree]).sqrt().mul(V::splat(pencil.scale[0][i]));
-        let column = moved.mul(lacking[degree]).sqrt().mul(V::splat(pencil.scale[1][i]));
-        for (side, value) in [row, column].into_iter().enumerate() {
-            let to = &mut pencil.lanes[side][i];
-            value.store(to);
-            for (value, exponent) in to.iter_mut().zip(exponent.iter_mut()) {
-                *value = scaled::power_near(*value);
-                *exponent -= scaled::exponent(*value);
-            }
+        let mut moved = V::splat(1.0);
+        if typical > 0.0 {
+            moved = diagonal.reciprocal().mul(V::splat(typical)).root_above();
         }
+        let row = moved.mul(over[degree]).mul(V::splat(pencil.scale[0][i]));
+        let column = moved.mul(roots[degree]).mul(V::splat(pencil.scale[1][i]));
+        exponents = exponents.add(power_near(row, &mut pencil.lanes[0][i]));
+        exponents = exponents.add(power_near(column, &mut pencil.lanes[1][i]));
     }
+    exponents
+}
+
+/// Stores the power of two below; its exponent.
+#[inline(always)]
+fn power_near<V: Vector>(value: V, to: &mut [f64; WIDTH]) -> V {
+    let (exponent, reciprocal) = value.exponent();
+    reciprocal.exponent().1.store(to);
+    exponent
 }
 
 /// Scales of motions: the roots of the diagonal of moduli of G, which cancel in the determinant.
@@ -832,11 +847,9 @@ fn scale<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>, exponent: &mut [i6
 fn scale_motions<V: Vector>(pencil: &mut Pencil) {
     let others = pencil.order.len();
     for i in 0..pencil.reduction.count {
-        let mut root = [0.0; WIDTH];
-        V::load(&pencil.gram.sizes[i]).sqrt().store(&mut root);
-        let power = root.map(scaled::power_near);
-        pencil.lanes[1][others + i] = power;
-        pencil.lanes[0][others + i] = power.map(f64::recip);
+        let (_, reciprocal) = V::load(&pencil.gram.sizes[i]).exponent();
+        reciprocal.store(&mut pencil.lanes[0][others + i]);
+        reciprocal.exponent().1.store(&mut pencil.lanes[1][others + i]);
     }
 }
 
@@ -865,7 +878,7 @@ fn condense<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) {
             let element = value::<V>(entry, at.powers[0][degree]).scale(column_scale);
             element.store(&mut values[at_entry]);
             let modulus = modulus::<V>(entry, at.moduli[0][degree]).mul(column_scale);
-            size = modulus.mul_add(V::load(&gram.sizes[row]).sqrt(), size);
+            size = modulus.mul_add(V::load(&gram.sizes[row]), size);
         }
         if range.is_empty() && j < others {
             continue;
@@ -878,7 +891,7 @@ fn condense<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) {
                 let value = Complex::<V>::load(value);
                 for i in 0..4 {
                     let g = Complex::<V>::load(&gram.elements[(block + i) * stride + row]);
-                    sums[i] = sums[i].add(g.mul(value));
+                    sums[i] = sums[i].add_product(g, value);
                 }
             }
             for i in 0..(count - block).min(4) {
@@ -890,7 +903,7 @@ fn condense<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) {
                 }
                 sum.store(&mut elimination.matrix[to * n + j]);
                 // The root of G's diagonal times the scale is less than two.
-                let root = V::load(&gram.sizes[block + i]).sqrt().mul(row_scale);
+                let root = V::load(&gram.sizes[block + i]).mul(row_scale);
                 root.mul(size).store(&mut elimination.doubt[to * n + j]);
             }
         }
@@ -924,7 +937,7 @@ fn doubt<V: Vector>(pencil: &mut Pencil) -> V {
         let v = Complex::<V>::load(&elimination.right[j]);
         for at in first[j]..first[j + 1] {
             let to = &mut forces[0][rows[at]];
-            Complex::<V>::load(to).add(Complex::load(&values[at]).mul(v)).store(to);
+            Complex::<V>::load(to).add_product(Complex::load(&values[at]), v).store(to);
         }
     }
     for i in 0..count {

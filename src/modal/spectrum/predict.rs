@@ -68,9 +68,9 @@ impl Base {
 fn guess(m: c64, d: c64, k: c64, pole: c64) -> c64 {
     let root = (d * d - 4.0 * m * k).sqrt();
     // The larger of the two without cancellation, the other by their product.
-    let sum = if (d + root).norm() >= (d - root).norm() { d + root } else { d - root };
+    let sum = if (d + root).norm_sqr() >= (d - root).norm_sqr() { d + root } else { d - root };
     let roots = [-0.5 * sum / m, -2.0 * k / sum];
-    let distance = |s: &c64| (s - pole).norm();
+    let distance = |s: &c64| (s - pole).norm_sqr();
     let finite = roots.into_iter().filter(|s| s.re.is_finite() && s.im.is_finite());
     let best = finite.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(pole);
     if pole.im == 0.0 {
@@ -130,7 +130,7 @@ impl Kernel for Reduced<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> [Complexes; 3] {
-        let Reduction { elastic, others, count, stride, own, motions, entries, .. } =
+        let Reduction { elastic, others, count, stride, own, motions, entries, occupied, .. } =
             self.reduction;
         let zero = Complex::<V>::splat(0.0, 0.0);
         let mut forms = [zero; 3];
@@ -162,20 +162,13 @@ impl Kernel for Reduced<'_> {
         for (seen, other) in seen[*count..].iter_mut().zip(others) {
             *seen = self.vectors[*other];
         }
-        for (row, entries) in entries.chunks_exact(seen.len()).enumerate() {
-            let mut sums = [zero; 3];
-            for ([right, _], entry) in seen.iter().zip(entries) {
-                if *entry == [0.0; 3] {
-                    continue;
-                }
-                let right = Complex::<V>::load(right);
-                for kind in 0..3 {
-                    sums[kind] = sums[kind].add_real_product(V::splat(entry[kind]), right);
-                }
-            }
-            let left = Complex::<V>::load(&seen[row][1]);
+        for &[row, column] in occupied {
+            let entry = entries[row * seen.len() + column];
+            let (right, left) =
+                (Complex::<V>::load(&seen[column][0]), Complex::load(&seen[row][1]));
+            let product = right.mul(left);
             for kind in 0..3 {
-                forms[kind] = forms[kind].add(sums[kind].mul(left));
+                forms[kind] = forms[kind].add_real_product(V::splat(entry[kind]), product);
             }
         }
         let mut stored = [Complexes::ZERO; 3];

@@ -6,10 +6,16 @@
 //! `pencil`. Which motions B there may be says `dynamics::Interface`; which of them are independent, and Z, a and β, are
 //! found in the matrices of the model themselves, and a product with a vector of signs proves that nothing is left out.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "closures and iterators do not inline into kernels of an instruction set"
+)]
+
 use super::lanes::{Kernel, Level, Vector, WIDTH};
 use crate::dynamics::Model;
 use faer::Mat;
 use nalgebra::DMatrix;
+use std::mem::swap;
 use std::ops::Range;
 
 /// Motions that are summed at once.
@@ -23,7 +29,7 @@ const DEPENDENT: f64 = 1e-13;
 /// An element of Z, a or β, in parts of the terms of which it is the sum, that is rounding.
 const ROUNDING: f64 = 2e-15;
 /// Elastic coordinates below which a reduction saves less than it costs.
-const LEAST_MODES: usize = 32;
+const LEAST_MODES: usize = 16;
 /// Most coordinates of a model with a full part that are not reduced.
 const MOST_WHOLE: usize = 48;
 /// Largest part of the terms of a product that may be left out; what is counts as rounding.
@@ -46,16 +52,27 @@ pub struct Reduction {
     pub stride: usize,
     /// Mass, damping and stiffness `[[Z, a], [β, L]]` over the motions, then the other coordinates, row by row.
     pub entries: Vec<[f64; 3]>,
+    /// Row and column of each that is not zero.
+    pub occupied: Vec<[usize; 2]>,
     /// What is of no few motions, less its diagonal, which is in `own`: damping and stiffness, and their transposes, square
     /// and row by row; empty where there is none.
     pub full: [[Vec<f64>; 2]; 2],
     /// Largest difference between the reduced form and the model, in parts of the terms that are summed.
     pub left_out: f64,
-    /// Rows that may be motions; then what elimination leaves of them.
+    /// Rows that may be motions, those of the model before, and what elimination leaves of them.
     candidates: Vec<f64>,
+    before: Vec<f64>,
     left: Vec<f64>,
-    /// Row and column of each pivot.
+    /// Row and column of each pivot; the inverse of the candidates there, column by column, in every lane.
     pivots: Vec<[usize; 2]>,
+    inverse: Vec<[f64; WIDTH]>,
+    /// Elements of the model between pivots, mass, damping and stiffness and their moduli in lanes, column by column.
+    between: Vec<[f64; WIDTH]>,
+    half: Vec<[f64; WIDTH]>,
+    /// Elements between pivots and another coordinate, in its column and in its row, three lanes each; what the motions
+    /// make of them, and the sums of moduli.
+    coupling: Vec<[f64; WIDTH]>,
+    through: Vec<[[f64; WIDTH]; 2]>,
 }
 
 /// Operations per frequency, over 8/3: the cube of the size of a whole matrix that would cost as much.
@@ -96,27 +113,34 @@ impl Reduction {
     }
 
     fn find(&mut self, level: Level, model: &Model) -> bool {
-        let known = &model.interface;
+        let interface = &model.interface;
         let size = model.coordinates();
         let elastic = self.elastic.clone();
         self.others.clear();
         self.others.extend((0..size).filter(|at| !elastic.contains(at)));
         let n = model.second_order;
         let whole = (n as f64).powi(3);
+        swap(&mut self.candidates, &mut self.before);
         self.gather(model);
         let modes = elastic.len();
-        let full = known.full.iter().any(|full| !full.is_empty());
+        let full = interface.full.iter().any(|full| !full.is_empty());
         let full = if full { FULL * (modes * modes) as f64 } else { 0.0 };
         // With a full part discs prove the poles of a whole matrix, residuals those of a reduced one: where the first is
         // at hand it is taken.
         let whole = if full > 0.0 && size <= MOST_WHOLE { 0.0 } else { whole };
-        let worth = |count: usize| effort(modes, count, n - modes) + full < 0.8 * whole;
-        if !self.pivot(elastic.len(), worth) {
+        let worth = |count: usize| effort(modes, count, n - modes) + full < whole;
+        // Most cases have the motions of the case before.
+        let same = self.own.len() == modes
+            && self.pivots.len().pow(2) == self.inverse.len()
+            && self.candidates == self.before;
+        let known = same && worth(self.pivots.len());
+        if !(known || self.pivot(elastic.len(), worth)) {
+            self.pivots.clear();
             return false;
         }
         self.own.clear();
-        self.own.extend(&known.own);
-        for (kind, full) in known.full.iter().enumerate() {
+        self.own.extend(&interface.own);
+        for (kind, full) in interface.full.iter().enumerate() {
             let count = elastic.len();
             let [plain, transposed] = &mut self.full[kind];
             plain.clone_from(full);
@@ -134,7 +158,7 @@ impl Reduction {
                 }
             }
         }
-        self.reduce(model) && self.complete(level, model)
+        self.reduce(level, model) && self.complete(level, model)
     }
 
     /// Rows that may be motions: those known, and what other coordinates see that are not attached to the body.
@@ -207,78 +231,103 @@ impl Reduction {
             }
         }
         self.pivots.sort_unstable();
-        self.count = self.pivots.len();
-        self.count > 0
-    }
-
-    /// B, and Z, a and β by the elements of the model at the pivots.
-    fn reduce(&mut self, model: &Model) -> bool {
-        let (modes, c, first) = (self.elastic.len(), self.count, self.elastic.start);
-        let size = c + self.others.len();
-        let columns: Vec<usize> = self.pivots.iter().map(|[_, column]| first + column).collect();
+        let c = self.pivots.len();
         let at_pivots = DMatrix::from_fn(c, c, |i, j| {
             self.candidates[self.pivots[i][0] * modes + self.pivots[j][1]]
         });
         let Some(inverse) = at_pivots.try_inverse() else { return false };
-        let moduli = inverse.abs();
-        let (mut row, mut column) = (Vec::with_capacity(c), Vec::with_capacity(c));
+        // Signed for values, moduli for the lanes of moduli.
+        let lanes =
+            |value: &f64| std::array::from_fn(|lane| if lane < 3 { *value } else { value.abs() });
+        self.inverse.clear();
+        self.inverse.extend(inverse.iter().map(lanes));
+        c > 0
+    }
+
+    /// B, and Z, a and β by the elements of the model at the pivots.
+    fn reduce(&mut self, level: Level, model: &Model) -> bool {
+        let (c, first) = (self.pivots.len(), self.elastic.start);
+        let size = c + self.others.len();
+        let columns: Vec<usize> = self.pivots.iter().map(|[_, column]| first + column).collect();
         self.entries.clear();
         self.entries.resize(size * size, [0.0; 3]);
         let matrices = [&model.mass, &model.damping, &model.stiffness];
+        self.between.clear();
+        self.between.resize(c * c, [0.0; WIDTH]);
+        let modes = self.elastic.len();
         for (kind, matrix) in matrices.into_iter().enumerate() {
-            let between = DMatrix::from_fn(c, c, |i, j| match i == j {
-                true => model.interface.attached[columns[i] - first][kind],
-                false => {
-                    matrix[(columns[i], columns[j])] - self.full_at(kind, columns[i], columns[j])
-                }
-            });
-            if between.iter().any(|value| *value != 0.0) {
-                let sizes = moduli.tr_mul(&between.abs()) * &moduli;
-                let between = inverse.tr_mul(&between) * &inverse;
-                for (index, (value, size_of)) in between.iter().zip(&sizes).enumerate() {
-                    if value.abs() > ROUNDING * size_of {
-                        self.entries[index % c * size + index / c][kind] = *value;
-                    }
+            let full = kind.checked_sub(1).map_or(&[][..], |kind| &self.full[kind][0]);
+            for (j, &column) in columns.iter().enumerate() {
+                let values = matrix.col_as_slice(column);
+                for (i, &row) in columns.iter().enumerate() {
+                    let full = full.get((row - first) * modes + column - first);
+                    let value = match i == j {
+                        true => model.interface.attached[row - first][kind],
+                        false => values[row] - full.unwrap_or(&0.0),
+                    };
+                    self.between[j * c + i][kind] = value;
+                    self.between[j * c + i][3 + kind] = value.abs();
                 }
             }
-            for (j, &other) in self.others.iter().enumerate() {
-                row.clear();
-                row.extend(columns.iter().map(|column| matrix[(other, *column)]));
+        }
+        self.half.resize(c * c, [0.0; WIDTH]);
+        let Self { between, half, inverse, .. } = self;
+        level.run(Sandwich { matrix: between, half, factor: inverse, count: c });
+        for (index, value) in self.between.iter().enumerate() {
+            for kind in 0..3 {
+                if value[kind].abs() > ROUNDING * value[3 + kind] {
+                    self.entries[index % c * size + index / c][kind] = value[kind];
+                }
+            }
+        }
+        self.coupling.resize(c, [0.0; WIDTH]);
+        self.through.resize(c, [[0.0; WIDTH]; 2]);
+        for (j, &other) in self.others.iter().enumerate() {
+            for (kind, matrix) in matrices.into_iter().enumerate() {
                 let values = matrix.col_as_slice(other);
-                column.clear();
-                column.extend(columns.iter().map(|column| values[*column]));
-                for (i, factors) in inverse.as_slice().chunks_exact(c).enumerate() {
-                    self.entries[i * size + c + j][kind] = through(factors, &column);
-                    self.entries[(c + j) * size + i][kind] = through(factors, &row);
+                for (coupling, &column) in self.coupling.iter_mut().zip(&columns) {
+                    coupling[kind] = values[column];
+                    coupling[3 + kind] = matrix[(other, column)];
                 }
                 for (i, &to) in self.others.iter().enumerate() {
-                    self.entries[(c + i) * size + c + j][kind] = matrix[(to, other)];
+                    self.entries[(c + i) * size + c + j][kind] = values[to];
                 }
+            }
+            if self.coupling.iter().flatten().all(|value| *value == 0.0) {
+                continue;
+            }
+            let Self { coupling, through, inverse, .. } = self;
+            level.run(Through { vector: coupling, to: through, factor: inverse });
+            for (i, [sums, sizes]) in self.through.iter().enumerate() {
+                // A sum of products, zero where it is but rounding.
+                let value = |lane: usize| match sums[lane].abs() > ROUNDING * sizes[lane] {
+                    true => sums[lane],
+                    false => 0.0,
+                };
+                self.entries[i * size + c + j] = [value(0), value(1), value(2)];
+                self.entries[(c + j) * size + i] = [value(3), value(4), value(5)];
             }
         }
         self.keep_coupled();
         self.entries.iter().flatten().all(|value| value.is_finite())
     }
 
-    /// Element of the full part of mass, damping or stiffness.
-    fn full_at(&self, kind: usize, row: usize, column: usize) -> f64 {
-        let first = self.elastic.start;
-        let full = kind.checked_sub(1).map(|kind| &self.full[kind][0]);
-        let at = (row - first) * self.elastic.len() + column - first;
-        full.and_then(|full| full.get(at)).copied().unwrap_or(0.0)
-    }
-
     /// Leaves out motions that act on nothing and that nothing acts on.
     fn keep_coupled(&mut self) {
-        let (modes, size) = (self.elastic.len(), self.count + self.others.len());
+        let count = self.pivots.len();
+        let (modes, size) = (self.elastic.len(), count + self.others.len());
         let entries = &self.entries;
         let coupled = |i: usize| {
             (0..size)
                 .any(|j| entries[i * size + j] != [0.0; 3] || entries[j * size + i] != [0.0; 3])
         };
-        let kept: Vec<usize> = (0..size).filter(|i| *i >= self.count || coupled(*i)).collect();
+        let kept: Vec<usize> = (0..size).filter(|i| *i >= count || coupled(*i)).collect();
         let entry = |i: &usize, j: &usize| entries[i * size + j];
         self.entries = kept.iter().flat_map(|i| kept.iter().map(move |j| entry(i, j))).collect();
+        let places = (0..kept.len()).flat_map(|i| (0..kept.len()).map(move |j| [i, j]));
+        self.occupied.clear();
+        let entries = self.entries.iter().zip(places).filter(|(entry, _)| **entry != [0.0; 3]);
+        self.occupied.extend(entries.map(|(_, place)| place));
         self.count = kept.len() - self.others.len();
         self.stride = self.count.next_multiple_of(BLOCK);
         self.motions.clear();
@@ -374,23 +423,91 @@ impl Reduction {
     }
 }
 
-/// A sum of products, zero where it is but rounding.
-fn through(factors: &[f64], values: &[f64]) -> f64 {
-    if values.iter().all(|value| *value == 0.0) {
-        return 0.0;
-    }
-    let (mut sum, mut size) = (0.0_f64, 0.0);
-    for (factor, value) in factors.iter().zip(values) {
-        sum += factor * value;
-        size += (factor * value).abs();
-    }
-    if sum.abs() > ROUNDING * size { sum } else { 0.0 }
-}
-
 /// Place and modulus of the largest element.
 fn largest(row: &[f64]) -> (usize, f64) {
     let most = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     (row.iter().position(|value| value.abs() == most).unwrap_or(0), most)
+}
+
+/// A matrix `A` becomes `Fᵀ A F`, in every lane; all column by column.
+struct Sandwich<'a> {
+    matrix: &'a mut [[f64; WIDTH]],
+    half: &'a mut [[f64; WIDTH]],
+    factor: &'a [[f64; WIDTH]],
+    count: usize,
+}
+
+impl Kernel for Sandwich<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { matrix, half, factor, count } = self;
+        // Aᵀ F, then (Aᵀ F)ᵀ F.
+        times::<V>(matrix, factor, half, count);
+        times::<V>(half, factor, matrix, count);
+    }
+}
+
+/// `to = Aᵀ F`, all column by column, a block of its columns at once.
+#[inline(always)]
+fn times<V: Vector>(
+    a: &[[f64; WIDTH]],
+    factor: &[[f64; WIDTH]],
+    to: &mut [[f64; WIDTH]],
+    count: usize,
+) {
+    for i in 0..count {
+        let column = &a[i * count..][..count];
+        for first in (0..count).step_by(BLOCK) {
+            let mut starts = [0; BLOCK];
+            for j in 0..BLOCK {
+                starts[j] = (first + j).min(count - 1) * count;
+            }
+            let factors = [
+                &factor[starts[0]..][..count],
+                &factor[starts[1]..][..count],
+                &factor[starts[2]..][..count],
+                &factor[starts[3]..][..count],
+            ];
+            let mut sums = [V::splat(0.0); BLOCK];
+            for k in 0..count {
+                let value = V::load(&column[k]);
+                for j in 0..BLOCK {
+                    sums[j] = V::load(&factors[j][k]).mul_add(value, sums[j]);
+                }
+            }
+            for j in 0..BLOCK.min(count - first) {
+                sums[j].store(&mut to[(first + j) * count + i]);
+            }
+        }
+    }
+}
+
+/// A vector becomes `Fᵀ v`, with the sums of moduli beside it.
+struct Through<'a> {
+    vector: &'a [[f64; WIDTH]],
+    to: &'a mut [[[f64; WIDTH]; 2]],
+    factor: &'a [[f64; WIDTH]],
+}
+
+impl Kernel for Through<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { vector, to, factor } = self;
+        for (to, factor) in to.iter_mut().zip(factor.chunks_exact(vector.len())) {
+            let (mut sum, mut size) = (V::splat(0.0), V::splat(0.0));
+            for (factor, value) in factor.iter().zip(vector) {
+                let (factor, value) = (V::splat(factor[0]), V::load(value));
+                sum = factor.mul_add(value, sum);
+                size = factor.abs().mul_add(value.abs(), size);
+            }
+            sum.store(&mut to[0]);
+            size.store(&mut to[1]);
+        }
+    }
 }
 
 /// Adds a matrix and its transpose, each times `factor` and signs on the elastic coordinates and zeros elsewhere.

@@ -72,7 +72,7 @@ fn dot<V: Vector>(a: &[Complexes], b: &[Complexes]) -> Complex<V> {
     let mut sums = [Complex::<V>::splat(0.0, 0.0); 2];
     for (a, b) in a.chunks(2).zip(b.chunks(2)) {
         for i in 0..a.len() {
-            sums[i] = sums[i].add(Complex::<V>::load(&a[i]).mul(Complex::load(&b[i])));
+            sums[i] = sums[i].add_product(Complex::load(&a[i]), Complex::load(&b[i]));
         }
     }
     sums[0].add(sums[1])

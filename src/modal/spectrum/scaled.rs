@@ -13,13 +13,13 @@ pub struct Scaled {
     pub exponent: i64,
 }
 
-/// The power of two nearest below in binary logarithm.
-pub fn power_near(value: f64) -> f64 {
-    f64::from_bits(value.to_bits() & 0x7ff0_0000_0000_0000)
+/// Modulus of a number whose square is in range; many times faster than where it may not be.
+pub fn modulus(z: c64) -> f64 {
+    z.norm_sqr().sqrt()
 }
 
 /// Binary exponent of a normal number.
-pub fn exponent(value: f64) -> i64 {
+fn exponent(value: f64) -> i64 {
     ((value.to_bits() >> 52) & 0x7ff) as i64 - 1023
 }
 
@@ -92,7 +92,17 @@ impl<V: Vector> Product<V> {
     pub fn times(&mut self, factor: Complex<V>) {
         self.value = self.value.mul(factor);
         self.factors += 1;
-        if self.factors == 8 {
+        if self.factors >= 8 {
+            self.normalise();
+        }
+    }
+
+    /// Product with two such factors: half the chain of roundings to wait for.
+    #[inline(always)]
+    pub fn times_both(&mut self, a: Complex<V>, b: Complex<V>) {
+        self.value = self.value.mul(a.mul(b));
+        self.factors += 2;
+        if self.factors >= 8 {
             self.normalise();
         }
     }
@@ -102,7 +112,7 @@ impl<V: Vector> Product<V> {
     pub fn times_real(&mut self, factor: V) {
         self.value = self.value.scale(factor);
         self.factors += 1;
-        if self.factors == 8 {
+        if self.factors >= 8 {
             self.normalise();
         }
     }

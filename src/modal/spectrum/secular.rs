@@ -11,13 +11,15 @@
 //! distance, the root is within `|V_j| Π |x_j − x_i|/|x_j − λ_i|`, less than 1.7 |V_j|.
 
 use super::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
-use super::scaled::{Product, Scaled};
+use super::scaled::{Product, Scaled, modulus};
 use faer::c64;
+use std::ops::Range;
 
 /// Sweeps over all roots before those that still move are looked at.
 const MOST_SWEEPS: usize = 30;
-/// Relative step at which a root rests.
+/// Relative step at which a root rests, and what its next step would be: steps shrink at least as they did before.
 const RESTED: f64 = 1e-13;
+const SETTLED: f64 = 1e-15;
 /// Relative step above which a root that does not come to rest may have changed its kind.
 const ADRIFT: f64 = 1e-4;
 /// Relative distance below which guesses are moved apart.
@@ -39,6 +41,14 @@ struct Root {
     partner: Option<usize>,
 }
 
+/// A weight, its modulus and the bound of its error.
+#[derive(Debug, Clone, Copy, Default)]
+struct Weight {
+    value: c64,
+    size: f64,
+    error: f64,
+}
+
 /// Nodes and roots.
 #[derive(Debug, Default)]
 pub struct Secular {
@@ -48,9 +58,8 @@ pub struct Secular {
     mirror: Vec<Option<usize>>,
     /// p over its leading coefficient at the nodes, with the bound of its relative error.
     value: Vec<(Scaled, f64)>,
-    /// Weights W with the bounds of their errors.
-    weight: Vec<c64>,
-    weight_error: Vec<f64>,
+    /// Weights W.
+    weight: Vec<Weight>,
     /// Roots, less the nodes of their slots.
     offset: Vec<c64>,
     roots: Vec<Root>,
@@ -58,8 +67,6 @@ pub struct Secular {
     radius: Vec<f64>,
     /// Roots that are to become nodes.
     pending: Vec<usize>,
-    /// Lane of each slot in the group at work.
-    lane: Vec<u8>,
 }
 
 /// A root with its bound.
@@ -84,8 +91,6 @@ pub enum Uncertain {
     Contradicted,
 }
 
-const NO_LANE: u8 = u8::MAX;
-
 impl Secular {
     /// Starts with these guesses, one of each conjugate pair (in the upper half plane) or real.
     pub fn start(&mut self, guesses: impl IntoIterator<Item = c64>) {
@@ -108,13 +113,9 @@ impl Secular {
         self.value.clear();
         self.value.resize(degree, (Scaled::ONE, 0.0));
         self.weight.clear();
-        self.weight.resize(degree, zero);
-        self.weight_error.clear();
-        self.weight_error.resize(degree, 0.0);
+        self.weight.resize(degree, Weight::default());
         self.offset.clear();
         self.offset.resize(degree, zero);
-        self.lane.clear();
-        self.lane.resize(degree, NO_LANE);
         self.radius.clear();
         self.radius.resize(self.roots.len(), f64::INFINITY);
         self.part(APART);
@@ -148,8 +149,8 @@ impl Secular {
                     continue;
                 }
                 let (a, b) = (self.at(root.own), self.at(other.own));
-                let distance = least * a.norm().max(b.norm());
-                if (a - b).norm() < distance {
+                let distance = least * modulus(a).max(modulus(b));
+                if modulus(a - b) < distance {
                     let pair = other.partner.is_some();
                     let step = if pair { c64::new(0.0, distance) } else { distance.into() };
                     self.offset[other.own] += step * 1.5;
@@ -167,11 +168,11 @@ impl Secular {
         let mut crowded = vec![false; order.len()];
         for (position, &(index, a)) in order.iter().enumerate() {
             for &(second, b) in &order[position + 1..] {
-                let distance = CROWDED * a.norm();
+                let distance = CROWDED * modulus(a);
                 if b.im - a.im > distance {
                     break;
                 }
-                if (a - b).norm() <= distance {
+                if modulus(a - b) <= distance {
                     (crowded[index], crowded[second]) = (true, true);
                 }
             }
@@ -201,19 +202,20 @@ impl Secular {
     /// Values or roots that are not finite.
     pub fn solve(&mut self, level: Level) -> Result<(), Uncertain> {
         self.weigh(level);
-        if !self.weight.iter().all(|w| w.is_finite())
-            || !self.weight_error.iter().all(|e| e.is_finite())
-        {
+        if !self.weight.iter().all(|w| w.value.is_finite() && w.error.is_finite()) {
             return Err(Uncertain::NonFinite);
         }
+        // Roots that are no new nodes were known well enough.
+        let mut moving = self.pending.clone();
         for kind in 0..4 {
-            let adrift = self.iterate(level);
+            let adrift = self.iterate(level, moving);
             if !self.offset.iter().all(|offset| offset.is_finite()) {
                 return Err(Uncertain::NonFinite);
             }
             if adrift.is_empty() || kind == 3 || !self.change_kind(&adrift) {
                 break;
             }
+            moving = (0..self.roots.len()).collect();
         }
         self.measure(level);
         let crowded = self.crowded();
@@ -221,8 +223,8 @@ impl Secular {
         for (index, root) in self.roots.iter().enumerate() {
             let radius = self.radius[index];
             // A node as near as that has its own rounding only, and would have it again.
-            let far = !(self.offset[root.own].norm() <= 0.1 * radius);
-            if (far || crowded[index]) && !(radius <= UNCERTAIN * self.at(root.own).norm()) {
+            let far = !(modulus(self.offset[root.own]) <= 0.1 * radius);
+            if (far || crowded[index]) && !(radius <= UNCERTAIN * modulus(self.at(root.own))) {
                 self.pending.push(index);
             }
         }
@@ -265,33 +267,32 @@ impl Secular {
             let product = level.run(Products { secular: self, group });
             for (&slot, product) in group.iter().zip(product) {
                 let (value, error) = self.value[slot];
-                let weight = value.over(product).value();
-                self.weight[slot] = weight;
+                let value = value.over(product).value();
+                let size = modulus(value);
                 let rounding = 8.0 * self.node.len() as f64 * f64::EPSILON;
-                self.weight_error[slot] = weight.norm() * (error + rounding);
+                self.weight[slot] = Weight { value, size, error: size * (error + rounding) };
             }
         }
         for slot in 0..self.node.len() {
             if let Some(upper) = self.mirror[slot] {
-                self.weight[slot] = self.weight[upper].conj();
-                self.weight_error[slot] = self.weight_error[upper];
+                let weight = self.weight[upper];
+                self.weight[slot] = Weight { value: weight.value.conj(), ..weight };
             }
         }
     }
 
-    /// Ehrlich and Aberth's iteration; the roots that do not come to rest.
-    fn iterate(&mut self, level: Level) -> Vec<usize> {
-        let groups = self.roots.len().div_ceil(WIDTH);
-        let mut rested = vec![false; groups];
-        let mut adrift = Vec::new();
-        for sweep in 0..MOST_SWEEPS {
-            for (group, rested) in rested.iter_mut().enumerate().filter(|(_, rested)| !**rested) {
-                let first = group * WIDTH;
-                let last = (first + WIDTH).min(self.roots.len());
-                let step = level.run(Step { secular: self, first, last });
-                *rested = true;
-                for index in first..last {
-                    let lane = index - first;
+    /// Ehrlich and Aberth's iteration of some roots; those that do not come to rest.
+    fn iterate(&mut self, level: Level, mut moving: Vec<usize>) -> Vec<usize> {
+        // The last step of each, relative; none yet.
+        let mut steps = vec![f64::NAN; self.roots.len()];
+        for _ in 0..MOST_SWEEPS {
+            let mut left = 0;
+            for first in (0..moving.len()).step_by(WIDTH) {
+                let mut group = [0; WIDTH];
+                let group = &mut group[..(moving.len() - first).min(WIDTH)];
+                group.copy_from_slice(&moving[first..first + group.len()]);
+                let step = level.run(Step { secular: self, group });
+                for (lane, &index) in group.iter().enumerate() {
                     let Root { own, partner } = self.roots[index];
                     let mut step = c64::new(step.re[lane], step.im[lane]);
                     if partner.is_none() {
@@ -306,18 +307,21 @@ impl Secular {
                             self.offset[partner] = self.offset[own].conj();
                         }
                     }
-                    let step = step.norm();
-                    *rested &= step <= RESTED * root.norm();
-                    if sweep + 1 == MOST_SWEEPS && !(step <= ADRIFT * root.norm()) {
-                        adrift.push(index);
+                    let step = modulus(step) / modulus(root);
+                    let before = std::mem::replace(&mut steps[index], step);
+                    if !(step <= RESTED || step * (step / before) <= SETTLED) {
+                        moving[left] = index;
+                        left += 1;
                     }
                 }
             }
-            if rested.iter().all(|rested| *rested) {
+            moving.truncate(left);
+            if moving.is_empty() {
                 break;
             }
         }
-        adrift
+        moving.retain(|index| !(steps[*index] <= ADRIFT));
+        moving
     }
 
     /// Splits a pair near the real axis into two real roots, or joins two real roots: false where
@@ -415,7 +419,7 @@ impl Secular {
                 if y.im - x.im > 2.0 * degree * (largest + r) {
                     break;
                 }
-                let distance = (x - y).norm();
+                let distance = modulus(x - y);
                 if !(r + q < distance) {
                     let (from, to) = (cluster[j], cluster[i]);
                     cluster.iter_mut().filter(|c| **c == from).for_each(|c| *c = to);
@@ -425,12 +429,12 @@ impl Secular {
             }
             near[i] |= x.im > 0.0 && !(2.0 * degree * r < x.im);
         }
-        let logarithms: f64 = discs.iter().map(|disc| disc.0.norm().ln()).sum();
+        let logarithms: f64 = discs.iter().map(|disc| modulus(disc.0).ln()).sum();
         let mean = (logarithms / discs.len().max(1) as f64).exp();
         let clustered = (0..discs.len()).any(|i| cluster[i] != i);
         for (i, &(x, r, v)) in discs.iter().enumerate() {
             let members = || (0..discs.len()).filter(|j| cluster[*j] == cluster[i]);
-            let multiplicity = members().count();
+            let multiplicity = if clustered { members().count() } else { 1 };
             let bound = if multiplicity > 1 || (x.im > 0.0 && r >= x.im) {
                 members().map(|j| (discs[j].0 - x).norm() + 2.0 * discs[j].1).fold(0.0, f64::max)
             } else if near[i] || clustered {
@@ -440,7 +444,7 @@ impl Secular {
             };
             // A pair whose discs meet each other across the axis may be two real roots.
             let certain = x.im == 0.0 || bound < x.im;
-            if !(certain && bound <= (LARGEST_BOUND * x.norm()).max(LARGEST_OF_ALL * mean)) {
+            if !(certain && bound <= (LARGEST_BOUND * modulus(x)).max(LARGEST_OF_ALL * mean)) {
                 return Err(Uncertain::Unresolved);
             }
             found.push(Bounded { root: x, bound, multiplicity });
@@ -452,7 +456,7 @@ impl Secular {
                 let (x, pair) = (bounded.root, bounded.root.im > 0.0);
                 for x in [Some(x), pair.then(|| x.conj())].into_iter().flatten() {
                     expected = expected.times(point - x);
-                    allowed += 2.0 * bounded.bound / (point - x).norm();
+                    allowed += 2.0 * bounded.bound / modulus(point - x);
                 }
             }
             let ratio = value.over(expected).value() - c64::new(1.0, 0.0);
@@ -464,89 +468,156 @@ impl Secular {
     }
 }
 
-/// One group of up to eight roots as it lies in memory.
+/// Up to eight slots, one in each lane.
 struct Group {
-    /// Nodes of their slots.
     node: Complexes,
-    /// Offsets.
     offset: Complexes,
+    weight: Complexes,
+    /// Slots, ascending, with their lanes; then one beyond the last slot.
+    own: [(usize, usize); WIDTH + 1],
+    count: usize,
 }
 
-impl Secular {
-    /// Marks the lanes of a group and gathers its nodes and offsets.
+impl Group {
     #[inline(always)]
-    fn gather(&mut self, slots: impl Iterator<Item = usize>) -> Group {
-        let mut group = Group {
-            node: Complexes { re: [1.0; WIDTH], ..Complexes::ZERO },
-            offset: Complexes::ZERO,
-        };
-        for (lane, slot) in slots.enumerate() {
-            self.lane[slot] = lane as u8;
-            let (node, offset) = (self.node[slot], self.offset[slot]);
-            (group.node.re[lane], group.node.im[lane]) = (node.re, node.im);
-            (group.offset.re[lane], group.offset.im[lane]) = (offset.re, offset.im);
+    fn of(secular: &Secular, slots: &[usize]) -> Self {
+        // Lanes without a slot look at a place of no meaning.
+        let nowhere = Complexes { re: [1.0; WIDTH], ..Complexes::ZERO };
+        let own = [(secular.node.len(), WIDTH); WIDTH + 1];
+        let [offset, weight] = [Complexes::ZERO; 2];
+        let mut group = Self { node: nowhere, offset, weight, own, count: slots.len() };
+        for (lane, &slot) in slots.iter().enumerate() {
+            let Self { node, offset, weight, own, .. } = &mut group;
+            own[lane] = (slot, lane);
+            let values = [secular.node[slot], secular.offset[slot], secular.weight[slot].value];
+            for (to, value) in [node, offset, weight].into_iter().zip(values) {
+                (to.re[lane], to.im[lane]) = (value.re, value.im);
+            }
         }
+        group.own[..slots.len()].sort_unstable();
         group
-    }
-
-    #[inline(always)]
-    fn release(&mut self, slots: impl Iterator<Item = usize>) {
-        slots.for_each(|slot| self.lane[slot] = NO_LANE);
     }
 }
 
 /// One in the lane that belongs to the slot itself.
 #[inline(always)]
-fn one_in<V: Vector>(lane: u8, value: Complex<V>) -> Complex<V> {
-    if lane == NO_LANE {
-        return value;
-    }
+fn one_in<V: Vector>(lane: Option<usize>, value: Complex<V>) -> Complex<V> {
+    let Some(lane) = lane else { return value };
     let mut stored = Complexes::ZERO;
     value.store(&mut stored);
-    (stored.re[usize::from(lane)], stored.im[usize::from(lane)]) = (1.0, 0.0);
+    (stored.re[lane], stored.im[lane]) = (1.0, 0.0);
     Complex::load(&stored)
 }
 
-/// Zero in the lane that belongs to the slot itself.
+/// A number in all lanes but that which belongs to the slot itself.
 #[inline(always)]
-fn zero_in<V: Vector>(lane: u8, value: V) -> V {
-    if lane == NO_LANE {
-        return value;
-    }
-    let mut stored = [0.0; WIDTH];
-    value.store(&mut stored);
-    stored[usize::from(lane)] = 0.0;
+fn zero_in<V: Vector>(lane: Option<usize>, value: f64) -> V {
+    let Some(lane) = lane else { return V::splat(value) };
+    let mut stored = [value; WIDTH];
+    stored[lane] = 0.0;
     V::load(&stored)
 }
 
 /// Products of the distances of nodes from all others.
-struct Products<'a, 'b> {
-    secular: &'a mut Secular,
-    group: &'b [usize],
+struct Products<'a> {
+    secular: &'a Secular,
+    group: &'a [usize],
 }
 
-impl Kernel for Products<'_, '_> {
+impl Kernel for Products<'_> {
     type Output = [Scaled; WIDTH];
 
     #[inline(always)]
     fn run<V: Vector>(self) -> Self::Output {
         let Self { secular, group } = self;
-        let own = secular.gather(group.iter().copied());
-        let own = Complex::<V>::load(&own.node);
+        let group = Group::of(secular, group);
+        let own = Complex::<V>::load(&group.node);
         let mut product = Product::<V>::new();
-        for (node, &lane) in secular.node.iter().zip(&secular.lane) {
-            product.times(one_in(lane, own.sub(Complex::splat(node.re, node.im))));
+        let mut next = 0;
+        for (slot, lane) in group.own.into_iter().take(group.count + 1) {
+            for pair in secular.node[next..slot].chunks(2) {
+                let a = own.sub(Complex::splat(pair[0].re, pair[0].im));
+                match pair.get(1) {
+                    Some(b) => product.times_both(a, own.sub(Complex::splat(b.re, b.im))),
+                    None => product.times(a),
+                }
+            }
+            if let Some(node) = secular.node.get(slot) {
+                product.times(one_in(Some(lane), own.sub(Complex::splat(node.re, node.im))));
+            }
+            next = slot + 1;
         }
-        secular.release(group.iter().copied());
         product.finish()
+    }
+}
+
+/// A node z, the offset of its root x' and its weight.
+type Slot<'a> = (&'a c64, &'a c64, &'a Weight);
+
+impl Secular {
+    #[inline(always)]
+    fn slots(&self, range: Range<usize>) -> impl Iterator<Item = Slot<'_>> {
+        let (node, offset) = (&self.node[range.clone()], &self.offset[range.clone()]);
+        let pairs = node.iter().zip(offset).zip(&self.weight[range]);
+        pairs.map(|((node, offset), weight)| (node, offset, weight))
+    }
+}
+
+/// x − z and x − x' of a slot, and the reciprocals of their squares, from one.
+struct Distances<V> {
+    a: Complex<V>,
+    b: Complex<V>,
+    over_a: V,
+    over_b: V,
+    size_a: V,
+}
+
+impl<V: Vector> Distances<V> {
+    #[inline(always)]
+    fn of((z, o, _): Slot, node: Complex<V>, h: Complex<V>, lane: Option<usize>) -> Self {
+        let a = one_in(lane, node.sub(Complex::splat(z.re, z.im)).add(h));
+        let b = one_in(lane, a.sub(Complex::splat(o.re, o.im)));
+        let (size_a, size_b) = (a.square(), b.square());
+        let inverse = size_a.mul(size_b).reciprocal();
+        let (over_a, over_b) = (inverse.mul(size_b), inverse.mul(size_a));
+        Self { a, b, over_a, over_b, size_a }
     }
 }
 
 /// One step for a group of roots.
 struct Step<'a> {
-    secular: &'a mut Secular,
-    first: usize,
-    last: usize,
+    secular: &'a Secular,
+    group: &'a [usize],
+}
+
+/// F without the root's own term, its slope less that term's, and what other roots add to the slope.
+struct Slopes<V> {
+    sum: Complex<V>,
+    slope: Complex<V>,
+    others: Complex<V>,
+}
+
+impl<V: Vector> Slopes<V> {
+    #[inline(always)]
+    fn add(&mut self, slot: Slot, node: Complex<V>, h: Complex<V>, lane: Option<usize>) {
+        let Distances { a, b, over_a, over_b, .. } = Distances::of(slot, node, h, lane);
+        let (re, im) = (a.re.mul(over_a), a.im.mul(over_a));
+        let w = slot.2;
+        let (w_re, w_im): (V, V) = (zero_in(lane, w.value.re), zero_in(lane, w.value.im));
+        let term = Complex {
+            re: w_im.mul_add(im, w_re.mul(re)),
+            im: w_re.negative_mul_add(im, w_im.mul(re)),
+        };
+        self.sum = self.sum.add(term);
+        self.slope = Complex {
+            re: term.im.negative_mul_add(im, term.re.negative_mul_add(re, self.slope.re)),
+            im: term.re.mul_add(im, term.im.negative_mul_add(re, self.slope.im)),
+        };
+        self.others = Complex {
+            re: over_b.negative_mul_add(b.re, self.others.re).add(re),
+            im: over_b.mul_add(b.im, self.others.im).sub(im),
+        };
+    }
 }
 
 impl Kernel for Step<'_> {
@@ -554,44 +625,28 @@ impl Kernel for Step<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> Complexes {
-        let Self { secular, first, last } = self;
-        let slots: [usize; WIDTH] =
-            std::array::from_fn(|lane| secular.roots[(first + lane).min(last - 1)].own);
-        let count = last - first;
-        let own = secular.gather(slots[..count].iter().copied());
-        let (node, h) = (Complex::<V>::load(&own.node), Complex::<V>::load(&own.offset));
-        let zero = Complex::<V>::splat(0.0, 0.0);
-        let mut sum = Complex::<V>::splat(1.0, 0.0);
-        let (mut slope, mut others) = (zero, zero);
-        for slot in 0..secular.node.len() {
-            let (z, w, o) = (secular.node[slot], secular.weight[slot], secular.offset[slot]);
-            let lane = secular.lane[slot];
-            // x − z and x − x' of every other slot; one division serves both reciprocals.
-            let a = one_in(lane, node.sub(Complex::splat(z.re, z.im)).add(h));
-            let b = one_in(lane, a.sub(Complex::splat(o.re, o.im)));
-            let (size_a, size_b) = (a.square(), b.square());
-            let inverse = V::splat(1.0).div(size_a.mul(size_b));
-            let (over_a, over_b) = (inverse.mul(size_b), inverse.mul(size_a));
-            let minus = V::splat(-1.0);
-            let a = Complex { re: a.re.mul(over_a), im: a.im.mul(over_a).mul(minus) };
-            let b = Complex { re: b.re.mul(over_b), im: b.im.mul(over_b).mul(minus) };
-            let w =
-                Complex { re: zero_in(lane, V::splat(w.re)), im: zero_in(lane, V::splat(w.im)) };
-            let term = w.mul(a);
-            sum = sum.add(term);
-            slope = slope.subtract_product(term, a);
-            others = others.add(a.sub(b));
+        let Self { secular, group } = self;
+        let mut slots = [0; WIDTH];
+        for (slot, root) in slots.iter_mut().zip(group) {
+            *slot = secular.roots[*root].own;
         }
-        let weight: Complexes = {
-            let mut weight = Complexes::ZERO;
-            for (lane, &slot) in slots[..count].iter().enumerate() {
-                let w = secular.weight[slot];
-                (weight.re[lane], weight.im[lane]) = (w.re, w.im);
+        let group = Group::of(secular, &slots[..group.len()]);
+        let (node, h) = (Complex::<V>::load(&group.node), Complex::<V>::load(&group.offset));
+        let zero = Complex::<V>::splat(0.0, 0.0);
+        let one = Complex::<V>::splat(1.0, 0.0);
+        let mut slopes = Slopes { sum: one, slope: zero, others: zero };
+        let mut next = 0;
+        for (own, lane) in group.own.into_iter().take(group.count + 1) {
+            for slot in secular.slots(next..own) {
+                slopes.add(slot, node, h, None);
             }
-            weight
-        };
-        secular.release(slots[..count].iter().copied());
-        let value = Complex::<V>::load(&weight).add(h.mul(sum));
+            if let Some(slot) = secular.slots(own..secular.node.len()).next() {
+                slopes.add(slot, node, h, Some(lane));
+            }
+            next = own + 1;
+        }
+        let Slopes { sum, slope, others } = slopes;
+        let value = Complex::<V>::load(&group.weight).add(h.mul(sum));
         let derivative = sum.add(h.mul(slope)).add(value.mul(others));
         let mut step = Complexes::ZERO;
         value.mul(derivative.reciprocal()).store(&mut step);
@@ -601,9 +656,35 @@ impl Kernel for Step<'_> {
 
 /// |V| with its error for a group of roots.
 struct Measure<'a> {
-    secular: &'a mut Secular,
+    secular: &'a Secular,
     first: usize,
     last: usize,
+}
+
+/// F without the root's own term, the errors of its weights, moduli of its terms, and Π |x − z|²/|x − x'|².
+struct Sizes<V> {
+    sum: Complex<V>,
+    error: V,
+    moduli: V,
+    ratio: Product<V>,
+}
+
+impl<V: Vector> Sizes<V> {
+    #[inline(always)]
+    fn add(&mut self, slot: Slot, node: Complex<V>, h: Complex<V>, lane: Option<usize>) {
+        let Distances { a, over_a, over_b, size_a, .. } = Distances::of(slot, node, h, lane);
+        let (re, im) = (a.re.mul(over_a), a.im.mul(over_a));
+        let w = slot.2;
+        let (w_re, w_im): (V, V) = (zero_in(lane, w.value.re), zero_in(lane, w.value.im));
+        self.sum = Complex {
+            re: w_im.mul_add(im, w_re.mul_add(re, self.sum.re)),
+            im: w_re.negative_mul_add(im, w_im.mul_add(re, self.sum.im)),
+        };
+        let over = over_a.root_above();
+        self.error = zero_in::<V>(lane, w.error).mul_add(over, self.error);
+        self.moduli = zero_in::<V>(lane, w.size).mul_add(over, self.moduli);
+        self.ratio.times_real(size_a.mul(over_b));
+    }
 }
 
 impl Kernel for Measure<'_> {
@@ -612,60 +693,45 @@ impl Kernel for Measure<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) -> [f64; WIDTH] {
         let Self { secular, first, last } = self;
-        let slots: [usize; WIDTH] =
-            std::array::from_fn(|lane| secular.roots[(first + lane).min(last - 1)].own);
-        let count = last - first;
-        let own = secular.gather(slots[..count].iter().copied());
-        let (node, h) = (Complex::<V>::load(&own.node), Complex::<V>::load(&own.offset));
-        let mut sum = Complex::<V>::splat(1.0, 0.0);
-        let mut error = V::splat(0.0);
-        let mut moduli = V::splat(1.0);
-        // Squares of moduli, the exponent of which is taken out now and then.
-        let mut ratio = Product::<V>::new();
-        for slot in 0..secular.node.len() {
-            let (z, w, o) = (secular.node[slot], secular.weight[slot], secular.offset[slot]);
-            let lane = secular.lane[slot];
-            let a = one_in(lane, node.sub(Complex::splat(z.re, z.im)).add(h));
-            let b = one_in(lane, a.sub(Complex::splat(o.re, o.im)));
-            let size = (w.re * w.re + w.im * w.im).sqrt();
-            let (re, im) = (zero_in(lane, V::splat(w.re)), zero_in(lane, V::splat(w.im)));
-            let size = zero_in(lane, V::splat(size));
-            let doubt = zero_in(lane, V::splat(secular.weight_error[slot]));
-            // One division serves both reciprocals.
-            let (size_a, size_b) = (a.square(), b.square());
-            let inverse = V::splat(1.0).div(size_a.mul(size_b));
-            let (over_a, over_b) = (inverse.mul(size_b), inverse.mul(size_a));
-            let minus = V::splat(0.0).sub(over_a);
-            let reciprocal = Complex { re: a.re.mul(over_a), im: a.im.mul(minus) };
-            sum = sum.add(Complex { re, im }.mul(reciprocal));
-            let over = over_a.sqrt();
-            error = doubt.mul_add(over, error);
-            moduli = size.mul_add(over, moduli);
-            ratio.times_real(size_a.mul(over_b));
+        let mut slots = [0; WIDTH];
+        for (slot, root) in slots.iter_mut().zip(&secular.roots[first..last]) {
+            *slot = root.own;
         }
+        let slots = &slots[..last - first];
+        let group = Group::of(secular, slots);
+        let (node, h) = (Complex::<V>::load(&group.node), Complex::<V>::load(&group.offset));
+        let (zero, one) = (V::splat(0.0), V::splat(1.0));
+        let sum = Complex { re: one, im: zero };
+        let mut sizes = Sizes { sum, error: zero, moduli: one, ratio: Product::new() };
+        let mut next = 0;
+        for (own, lane) in group.own.into_iter().take(group.count + 1) {
+            for slot in secular.slots(next..own) {
+                sizes.add(slot, node, h, None);
+            }
+            if let Some(slot) = secular.slots(own..secular.node.len()).next() {
+                sizes.add(slot, node, h, Some(lane));
+            }
+            next = own + 1;
+        }
+        let Sizes { sum, error, moduli, ratio } = sizes;
         let ratio = ratio.finish();
         let rounding = (secular.node.len() as f64 + 16.0) * f64::EPSILON;
         let mut stored = [[0.0; WIDTH]; 2];
         error.store(&mut stored[0]);
         moduli.store(&mut stored[1]);
-        let product = h.mul(sum);
         let mut value = Complexes::ZERO;
-        product.store(&mut value);
+        h.mul(sum).store(&mut value);
         let [error, moduli] = stored;
-        let radius = std::array::from_fn(|lane| {
-            if lane >= count {
-                return 0.0;
-            }
-            let slot = slots[lane];
-            let (w, offset) = (secular.weight[slot], secular.offset[slot].norm());
+        let mut radius = [0.0; WIDTH];
+        for (lane, &slot) in slots.iter().enumerate() {
+            let (w, offset) = (secular.weight[slot], modulus(secular.offset[slot]));
             let g = c64::new(value.re[lane], value.im[lane]);
-            let uncertain = secular.weight_error[slot]
+            let uncertain = w.error
                 + offset * (error[lane] + rounding * moduli[lane])
-                + 4.0 * f64::EPSILON * (w.norm() + g.norm());
-            let size = (w + g).norm() + uncertain;
-            size * ratio[lane].value().re.sqrt() * (1.0 + rounding)
-        });
-        secular.release(slots[..count].iter().copied());
+                + 4.0 * f64::EPSILON * (w.size + modulus(g));
+            let size = modulus(w.value + g) + uncertain;
+            radius[lane] = size * ratio[lane].value().re.sqrt() * (1.0 + rounding);
+        }
         radius
     }
 }
