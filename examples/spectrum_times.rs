@@ -14,6 +14,7 @@ use tvse::campaign::Evaluator;
 use tvse::dispersion::Sampler;
 use tvse::io::scenario::{self, Reach};
 use tvse::modal::Solver;
+use tvse::modal::spectrum::lanes::{Kernel, Level, Vector, WIDTH};
 use tvse::modal::spectrum::{Base, Spectrum};
 use tvse::structure::{self, Selection, Stick};
 use tvse::vehicle::Vehicle;
@@ -28,6 +29,36 @@ fn least(mut work: impl FnMut()) -> f64 {
         start.elapsed().as_secs_f64()
     };
     (0..REPETITIONS).map(time).fold(f64::INFINITY, f64::min)
+}
+
+/// Products and sums of independent numbers, as many as registers hold.
+struct Peak(usize);
+
+impl Kernel for Peak {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run<V: Vector>(self) -> f64 {
+        let factor = V::splat(1.0 - f64::EPSILON);
+        let mut sums = [V::splat(1.0); 24];
+        for _ in 0..self.0 {
+            for sum in &mut sums {
+                *sum = sum.mul_add(factor, factor);
+            }
+        }
+        let mut stored = [0.0; WIDTH];
+        sums.into_iter().fold(V::splat(0.0), V::add).store(&mut stored);
+        stored[0]
+    }
+}
+
+/// Operations a second that the core can do.
+fn peak() -> f64 {
+    const TURNS: usize = 100_000;
+    let time = least(|| {
+        std::hint::black_box(Level::best().run(Peak(std::hint::black_box(TURNS))));
+    });
+    (2 * 24 * WIDTH * TURNS) as f64 / time
 }
 
 /// Gives the vehicle as many modes, and leaves it the gimballed engines only.
@@ -81,8 +112,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let evaluator = Evaluator::new(&loaded.vehicle.vehicle, &sampler, definition, false)?;
     println!(
-        "variant,flight_time_s,case,states,file,structured_s,some_s,all_s,dense_s,determinants,poles,bound,certificate"
+        "variant,flight_time_s,case,states,file,structured_s,some_s,all_s,dense_s,determinants,poles,bound,certificate,operations,peak"
     );
+    let peak = peak();
     for case in 0..cases.parse()? {
         let mut failed = None;
         evaluator.visit(1, case, |view| {
@@ -125,8 +157,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 });
                 let (states, count) = (state.nrows(), poles.len());
                 let time = definition.flight_times_s[time];
-                let effort = spectrum.evaluations();
-                println!("{name},{time},{case},{states},{file},{structured:e},{some:e},{all:e},{dense:e},{effort},{count},{bound:e},{kind}");
+                let (effort, operations) = (spectrum.evaluations(), spectrum.operations(view.model));
+                println!("{name},{time},{case},{states},{file},{structured:e},{some:e},{all:e},{dense:e},{effort},{count},{bound:e},{kind},{operations:e},{peak:e}");
                 Ok(())
             };
             failed = result().err().or(failed.take());

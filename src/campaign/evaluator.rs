@@ -287,10 +287,11 @@ impl<'a> Evaluator<'a> {
     ) -> Option<Result<Loops, Failure>> {
         let (open, plan) =
             (at.variants[variant].loops.as_ref()?, self.definition.margins.as_ref()?);
-        let Buffers { model, solver, .. } = Buffers::of(buffers, open.coordinates());
-        let found = drawn
-            .clone()
-            .and_then(|()| open.assess(vehicle, model, solver, poles, plan, &plan.envelope_hz));
+        let Buffers { model, solver, spectrum, .. } = Buffers::of(buffers, open.coordinates());
+        let found = drawn.clone().and_then(|()| {
+            let room = (&mut *model, &mut *solver, spectrum);
+            open.assess(vehicle, room, poles, plan, &plan.envelope_hz)
+        });
         Some(found.map(|found| open.store(&found, model, solver, plan)))
     }
 
@@ -323,8 +324,8 @@ impl<'a> Evaluator<'a> {
         if self.solve(at, &place, (variant, false), closed, poles).is_err() {
             poles.clear();
         }
-        let Buffers { model, solver, .. } = Buffers::of(buffers, open.coordinates());
-        open.assess(vehicle, model, solver, poles, plan, &plan.envelope_hz).map(Some)
+        let Buffers { model, solver, spectrum, .. } = Buffers::of(buffers, open.coordinates());
+        open.assess(vehicle, (model, solver, spectrum), poles, plan, &plan.envelope_hz).map(Some)
     }
 
     /// Builds the model of the nominal vehicle at a flight time and in a variant (indices of the
@@ -668,7 +669,11 @@ fn at_time(
             }
             if definition.margins.as_ref().is_some_and(|plan| plan.holds(index)) {
                 let effects = prepared.effects;
-                prepared.loops = Some(OpenLoop::new(vehicle, set, definition, variant, effects)?);
+                let mut open = OpenLoop::new(vehicle, set, definition, variant, effects)?;
+                if structured {
+                    open.prove(&nominal);
+                }
+                prepared.loops = Some(open);
             }
             Ok::<_, Error>(prepared)
         })

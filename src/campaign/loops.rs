@@ -9,6 +9,7 @@ use super::{Failure, FailureKind};
 use crate::dynamics::servo::{self, Row};
 use crate::dynamics::{DrawnVehicle, Effects, Feedback, Model, Plant, Servo};
 use crate::margins::{self, Assessment, AxisMargins, Peak, assess};
+use crate::modal::spectrum::{Base, Spectrum};
 use crate::modal::{Reference, Response, Solver};
 use crate::vehicle::{ModeSet, Vehicle};
 use nalgebra::{Complex, DMatrix, Matrix3};
@@ -54,6 +55,8 @@ pub struct OpenLoop {
     effects: Effects,
     /// Sign of the feedback: −1 where the variant inverts it.
     sign: f64,
+    /// Every nominal pole, from which those of cases are found.
+    base: Option<Base>,
 }
 
 impl OpenLoop {
@@ -74,7 +77,14 @@ impl OpenLoop {
             return Err(servo::Error::NoAutopilot.into());
         }
         let sign = if variant.feedback == Feedback::Inverted { -1.0 } else { 1.0 };
-        Ok(Self { plant, effects, sign })
+        Ok(Self { plant, effects, sign, base: None })
+    }
+
+    /// Has poles found from those of the nominal vehicle, where these can be certified.
+    pub fn prove(&mut self, nominal: &DrawnVehicle) {
+        let mut model = Model::zeros(self.coordinates());
+        self.plant.assemble(nominal, &self.effects, &mut model);
+        self.base = Base::proven(&model, &mut Solver::new(self.coordinates()));
     }
 
     /// Size of its models.
@@ -83,7 +93,7 @@ impl OpenLoop {
     }
 
     /// Assesses the loops of a drawn vehicle; the model of the open loops stays in `model`, whose size is
-    /// that of `solver`. `closed` are the poles of the closed loop, `wanted_hz` frequencies at which the
+    /// that of `solver` and `spectrum`. `closed` are the poles of the closed loop, `wanted_hz` frequencies at which the
     /// curve shall have a sample.
     ///
     /// # Errors
@@ -91,8 +101,7 @@ impl OpenLoop {
     pub fn assess(
         &self,
         drawn: &DrawnVehicle,
-        model: &mut Model,
-        solver: &mut Solver,
+        (model, solver, spectrum): (&mut Model, &mut Solver, &mut Spectrum),
         closed: &[Complex<f64>],
         plan: &LoopPlan,
         wanted_hz: &[f64],
@@ -101,8 +110,11 @@ impl OpenLoop {
         let servo = servo.as_ref().expect("an open loop has a servo part");
         let (autopilot, law) = servo.autopilot().expect("an open loop has an autopilot");
         self.plant.assemble(drawn, &self.effects, model);
-        let mut poles = Vec::new();
-        solver.poles(model, &mut poles).map_err(|error| Failure::from(&error))?;
+        let certified = self.base.as_ref().and_then(|base| spectrum.solve(base, model).ok());
+        let mut poles: Vec<_> = certified.iter().flatten().map(|pole| pole.root).collect();
+        if certified.is_none() {
+            solver.poles(model, &mut poles).map_err(|error| Failure::from(&error))?;
+        }
         // Axis commands are the first external inputs.
         let inputs = servo.inputs(&servo.compose(drawn), layout).columns(0, 3).into_owned();
         let signals = law.signals().iter();

@@ -159,7 +159,8 @@ pub enum Certificate {
     Discs,
     /// Disjoint discs, of which some hold several poles that cannot be told apart.
     Clusters,
-    /// Dense solve: sums of poles against traces, residuals of the pairs.
+    /// Residuals of the pairs, sums of poles against traces: of a dense solve; or of a structured one of a model with a full
+    /// part, where the residuals' discs do not meet.
     Residual,
 }
 

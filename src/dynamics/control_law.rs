@@ -15,6 +15,8 @@ pub struct ControlLaw {
     sensed: DMatrix<Complex<f64>>,
     /// Weights of the outputs of other paths, paths × paths.
     chained: DMatrix<Complex<f64>>,
+    /// Paths in an order in which each comes after those that it reads; none where some read each other.
+    order: Option<Vec<usize>>,
 }
 
 impl ControlLaw {
@@ -35,9 +37,11 @@ impl ControlLaw {
         };
         let outputs: Vec<String> = paths.iter().map(|path| path.signal()).collect();
         let count = paths.len();
+        let chained = DMatrix::from_fn(count, count, |i, j| weight(i, &outputs[j]));
         Self {
             sensed: DMatrix::from_fn(count, names.len(), |i, j| weight(i, &names[j])),
-            chained: DMatrix::from_fn(count, count, |i, j| weight(i, &outputs[j])),
+            order: order(&chained),
+            chained,
             signals,
         }
     }
@@ -55,10 +59,8 @@ impl ControlLaw {
         drawn: &DrawnAutopilot,
         s: Complex<f64>,
     ) -> Option<DMatrix<Complex<f64>>> {
-        let paths = autopilot.paths.len();
-        let mut left = DMatrix::identity(paths, paths);
-        let mut right = self.sensed.clone();
-        for (i, (path, draw)) in autopilot.paths.iter().zip(&drawn.paths).enumerate() {
+        let mut values = Vec::with_capacity(autopilot.paths.len());
+        for (path, draw) in autopilot.paths.iter().zip(&drawn.paths) {
             let filters = path.filters.iter().zip(&draw.filters);
             let value: Complex<f64> =
                 filters.map(|(filter, draw)| filter.kind.response(draw, s)).product();
@@ -66,12 +68,9 @@ impl ControlLaw {
             if !(value.re.is_finite() && value.im.is_finite()) {
                 return None;
             }
-            right.row_mut(i).iter_mut().for_each(|entry| *entry *= value);
-            for j in 0..paths {
-                left[(i, j)] -= value * self.chained[(i, j)];
-            }
+            values.push(value);
         }
-        let outputs = left.lu().solve(&right)?;
+        let outputs = self.outputs(&values)?;
         let delay = delay::response(drawn.delay_s, s);
         let mut feedback = DMatrix::zeros(Axis::ALL.len(), self.signals.len());
         for (i, path) in autopilot.paths.iter().enumerate() {
@@ -82,5 +81,74 @@ impl ControlLaw {
             }
         }
         Some(feedback)
+    }
+
+    /// Outputs of the paths, paths × signals, for the response of each path; none where paths that read each other have
+    /// no solution.
+    fn outputs(&self, values: &[Complex<f64>]) -> Option<DMatrix<Complex<f64>>> {
+        let mut outputs = self.sensed.clone();
+        if let Some(order) = &self.order {
+            for &i in order {
+                for column in 0..outputs.ncols() {
+                    let read = (0..order.len())
+                        .filter(|j| self.chained[(i, *j)] != Complex::ZERO)
+                        .map(|j| self.chained[(i, j)] * outputs[(j, column)]);
+                    let input = outputs[(i, column)] + read.sum::<Complex<f64>>();
+                    outputs[(i, column)] = values[i] * input;
+                }
+            }
+            return Some(outputs);
+        }
+        let mut left = DMatrix::identity(values.len(), values.len());
+        for (i, &value) in values.iter().enumerate() {
+            outputs.row_mut(i).iter_mut().for_each(|entry| *entry *= value);
+            for j in 0..values.len() {
+                left[(i, j)] -= value * self.chained[(i, j)];
+            }
+        }
+        left.lu().solve(&outputs)
+    }
+}
+
+/// An order in which every path comes after those it reads.
+fn order(chained: &DMatrix<Complex<f64>>) -> Option<Vec<usize>> {
+    let count = chained.nrows();
+    let mut order: Vec<usize> = Vec::with_capacity(count);
+    while order.len() < count {
+        let ready = |i: &usize| {
+            !order.contains(i)
+                && (0..count).all(|j| order.contains(&j) || chained[(*i, j)] == Complex::ZERO)
+        };
+        let next = (0..count).find(ready)?;
+        order.push(next);
+    }
+    Some(order)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_in_order_give_what_solving_for_all_gives() {
+        let complex = |x: f64| Complex::new(x, 0.0);
+        // The third reads the first and a sensor, the second the third.
+        let chained = DMatrix::from_row_slice(3, 3, &[0., 0., 0., 0., 0., 2., -0.5, 0., 0.]);
+        let sensed = DMatrix::from_row_slice(3, 2, &[1., 0., 0., 3., 0.5, 0.]);
+        let (sensed, chained) = (sensed.map(complex), chained.map(complex));
+        let values = [Complex::new(0.3, -1.0), Complex::new(2.0, 0.7), Complex::new(-0.1, 0.4)];
+        let mut law = ControlLaw { signals: Vec::new(), sensed, order: order(&chained), chained };
+        assert_eq!(law.order, Some(vec![0, 2, 1]));
+        let by_order = law.outputs(&values).expect("regular");
+        law.order = None;
+        let by_solution = law.outputs(&values).expect("regular");
+        assert!((by_order - by_solution).norm() < 1e-14);
+    }
+
+    #[test]
+    fn paths_that_read_each_other_have_no_order() {
+        let chained = DMatrix::from_row_slice(3, 3, &[0., 1., 0., 0., 0., 2., -0.5, 0., 0.]);
+        assert_eq!(order(&chained.map(|x| Complex::new(x, 0.0))), None);
+        assert_eq!(order(&DMatrix::from_element(1, 1, Complex::new(0.5, 0.0))), None);
     }
 }

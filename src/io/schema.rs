@@ -391,7 +391,8 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
         Column::word(
             "certificate",
             "What proves the poles of the evaluation: discs, one pole in each; clusters, discs of which some \
-             hold several poles; residual, a dense solve with its traces and residuals",
+             hold several poles; residual, residuals of the pairs and sums of poles against traces, of a dense solve or, \
+             structured with a full jet damping matrix, with discs of the residuals that do not meet",
             Certificate::ALL.map(Certificate::name),
             |r: &ModeRow| Some(r.solution?.certificate as usize),
         ),

@@ -117,6 +117,11 @@ impl Spectrum {
         self.evaluations
     }
 
+    /// Floating-point operations of the last model, `model`: those of its determinants, and of products with its full part.
+    pub fn operations(&self, model: &Model) -> f64 {
+        8.0 / 3.0 * self.pencil.reduction().effort(model) * self.evaluations as f64
+    }
+
     /// All poles of `model`, found from those of `base`: pairs by their member in the upper half plane, sorted by
     /// imaginary, then real part; without those at the origin that are known by construction.
     ///
