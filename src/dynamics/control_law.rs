@@ -15,8 +15,8 @@ pub struct ControlLaw {
     sensed: DMatrix<Complex<f64>>,
     /// Weights of the outputs of other paths, paths × paths.
     chained: DMatrix<Complex<f64>>,
-    /// Paths in an order in which each comes after those that it reads; none where some read each other.
-    order: Option<Vec<usize>>,
+    /// Paths, each with those that it reads, in an order in which these come before; none where some read each other.
+    order: Option<Vec<(usize, Vec<usize>)>>,
 }
 
 impl ControlLaw {
@@ -88,13 +88,13 @@ impl ControlLaw {
     fn outputs(&self, values: &[Complex<f64>]) -> Option<DMatrix<Complex<f64>>> {
         let mut outputs = self.sensed.clone();
         if let Some(order) = &self.order {
-            for &i in order {
+            for (i, read) in order {
                 for column in 0..outputs.ncols() {
-                    let read = (0..order.len())
-                        .filter(|j| self.chained[(i, *j)] != Complex::ZERO)
-                        .map(|j| self.chained[(i, j)] * outputs[(j, column)]);
-                    let input = outputs[(i, column)] + read.sum::<Complex<f64>>();
-                    outputs[(i, column)] = values[i] * input;
+                    let mut input = outputs[(*i, column)];
+                    for j in read {
+                        input += self.chained[(*i, *j)] * outputs[(*j, column)];
+                    }
+                    outputs[(*i, column)] = values[*i] * input;
                 }
             }
             return Some(outputs);
@@ -110,17 +110,15 @@ impl ControlLaw {
     }
 }
 
-/// An order in which every path comes after those it reads.
-fn order(chained: &DMatrix<Complex<f64>>) -> Option<Vec<usize>> {
+/// An order in which every path comes after those it reads, with these.
+fn order(chained: &DMatrix<Complex<f64>>) -> Option<Vec<(usize, Vec<usize>)>> {
     let count = chained.nrows();
-    let mut order: Vec<usize> = Vec::with_capacity(count);
+    let reads = |i: usize| (0..count).filter(move |j| chained[(i, *j)] != Complex::ZERO);
+    let mut order: Vec<(usize, Vec<usize>)> = Vec::with_capacity(count);
     while order.len() < count {
-        let ready = |i: &usize| {
-            !order.contains(i)
-                && (0..count).all(|j| order.contains(&j) || chained[(*i, j)] == Complex::ZERO)
-        };
-        let next = (0..count).find(ready)?;
-        order.push(next);
+        let done = |i: usize| order.iter().any(|(path, _)| *path == i);
+        let next = (0..count).find(|i| !done(*i) && reads(*i).all(done))?;
+        order.push((next, reads(next).collect()));
     }
     Some(order)
 }
@@ -138,7 +136,7 @@ mod tests {
         let (sensed, chained) = (sensed.map(complex), chained.map(complex));
         let values = [Complex::new(0.3, -1.0), Complex::new(2.0, 0.7), Complex::new(-0.1, 0.4)];
         let mut law = ControlLaw { signals: Vec::new(), sensed, order: order(&chained), chained };
-        assert_eq!(law.order, Some(vec![0, 2, 1]));
+        assert_eq!(law.order, Some(vec![(0, vec![]), (2, vec![0]), (1, vec![2])]));
         let by_order = law.outputs(&values).expect("regular");
         law.order = None;
         let by_solution = law.outputs(&values).expect("regular");
