@@ -22,6 +22,8 @@ const RESTED: f64 = 1e-13;
 const SETTLED: f64 = 1e-15;
 /// Relative step above which a root that does not come to rest may have changed its kind.
 const ADRIFT: f64 = 1e-4;
+/// Relative step of a root that wanders without a goal.
+const LOST: f64 = 0.05;
 /// Relative distance below which guesses are moved apart.
 const APART: f64 = 1e-4;
 /// Relative distance of roots that may be one repeated root; they become nodes in every round, which draws
@@ -281,8 +283,8 @@ impl Secular {
         }
     }
 
-    /// Ehrlich and Aberth's iteration of some roots; those that do not come to rest.
-    fn iterate(&mut self, level: Level, mut moving: Vec<usize>) -> Vec<usize> {
+    /// Ehrlich and Aberth's iteration of some roots; those that do not come to rest, with their last relative steps.
+    fn iterate(&mut self, level: Level, mut moving: Vec<usize>) -> Vec<(usize, f64)> {
         // The last step of each, relative; none yet.
         let mut steps = vec![f64::NAN; self.roots.len()];
         for _ in 0..MOST_SWEEPS {
@@ -320,23 +322,24 @@ impl Secular {
                 break;
             }
         }
-        moving.retain(|index| !(steps[*index] <= ADRIFT));
-        moving
+        let adrift = moving.into_iter().map(|index| (index, steps[index]));
+        adrift.filter(|(_, step)| !(*step <= ADRIFT)).collect()
     }
 
     /// Splits a pair near the real axis into two real roots, or joins two real roots: false where
     /// none of the roots can be of another kind.
-    fn change_kind(&mut self, adrift: &[usize]) -> bool {
+    fn change_kind(&mut self, adrift: &[(usize, f64)]) -> bool {
         let mut changed = false;
         let mut gone = Vec::new();
-        for (position, &index) in adrift.iter().enumerate() {
+        for (position, &(index, step)) in adrift.iter().enumerate() {
             if gone.contains(&index) {
                 continue;
             }
             let Root { own, partner } = self.roots[index];
             let root = self.at(own);
             if let Some(partner) = partner {
-                if !(root.im.abs() < 0.5 * root.norm()) {
+                // Small steps far from the axis are those towards a repeated root.
+                if !(root.im.abs() < 0.5 * root.norm() || step > LOST) {
                     continue;
                 }
                 let apart = root.im.abs().max(1e-3 * root.norm());
@@ -347,7 +350,7 @@ impl Secular {
                 self.roots.push(Root { own: partner, partner: None });
                 changed = true;
             } else {
-                let others = adrift[position + 1..].iter().copied();
+                let others = adrift[position + 1..].iter().map(|(other, _)| *other);
                 let others = others
                     .filter(|other| self.roots[*other].partner.is_none() && !gone.contains(other));
                 let distance = |other: &usize| (self.at(self.roots[*other].own) - root).norm();

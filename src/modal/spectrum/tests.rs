@@ -257,6 +257,36 @@ fn a_value_that_contradicts_the_roots_is_no_certificate() {
 }
 
 #[test]
+fn real_roots_are_found_from_pairs_far_from_the_axis() {
+    // Roots ±2i and two real ones; a pair is guessed for these, and wanders.
+    for real in [[-1.0, -3.0], [-0.01, -8.0], [1.0, -2.0], [-1.9, -2.1]] {
+        for guess in [c64::new(-2.0, 3.8), c64::new(0.5, 6.0), c64::new(-0.1, 1.9)] {
+            let mut secular = secular::Secular::default();
+            secular.start([c64::new(0.01, 2.1), guess]);
+            let value = |s: c64| {
+                let p = (s * s + 4.0) * (s - real[0]) * (s - real[1]);
+                scaled::Scaled::ONE.times(p)
+            };
+            for _ in 0..5 {
+                let points: Vec<c64> = secular.pending().collect();
+                for (index, point) in points.into_iter().enumerate() {
+                    secular.take(index, value(point), 1e-15);
+                }
+                secular.solve(Level::best()).expect("finite");
+                secular.renew();
+            }
+            let found = secular.certify([]).expect("certified");
+            let roots: Vec<c64> = found.iter().map(|found| found.root).collect();
+            assert_eq!(roots.len(), 3, "{real:?} from {guess}: {roots:?}");
+            for root in real.map(|x| c64::new(x, 0.0)).into_iter().chain([c64::new(0.0, 2.0)]) {
+                let near = |x: &c64| (x - root).norm() < 1e-9;
+                assert!(roots.iter().any(near), "{real:?} from {guess}: {roots:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn instruction_sets_agree_within_the_bounds() {
     let frequencies: Vec<f64> = (0..9).map(|i| 1.0 + 0.5 * f64::from(i)).collect();
     let nominal = base(&model(&frequencies, 0.1, 0.2));
