@@ -97,9 +97,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         with_modes(&mut loaded.vehicle.vehicle, &definition.gimballed, modes)?;
         definition.gimballed.retain(|gimballed| *gimballed);
         definition.flight_times_s = vec![TIME_S];
-        definition
-            .variants
-            .retain(|variant| ["no_jet_damping", "case_only"].contains(&&*variant.name));
+        definition.variants.retain(|v| ["no_jet_damping", "jet_damping"].contains(&&*v.name));
     }
     let definition = &definition;
     let drawn = include_str!("../dispersions/reference.toml");
