@@ -151,6 +151,18 @@ def test_many_modes_are_proven_by_discs_and_with_the_full_jet_matrix_by_residual
         assert np.abs(rows[parts].sum(axis=1) - 1).max() < 1e-8
 
 
+def test_repeated_poles_stay_what_they_are_under_the_full_jet_matrix(many):
+    # Four equal engines on one ring: poles of their own to which no mode answers.
+    text = (many / "run.toml").read_text().replace('["booster.*"]', '["*.*"]').replace("cases = 8", "cases = 3")
+    (many / "six.toml").write_text(text)
+    out = tvse("run", many / "six.toml", "--poles", "all", "--audit", 4, "--output", many / "six")
+    assert ": agreed" in out
+    modes = pd.read_parquet(many / "six/tables/modes.parquet")
+    assert (modes["solver"] == "structured").all()
+    proven = modes.groupby("variant")["certificate"].unique().map(list).to_dict()
+    assert proven["jet_damping"] == ["residual"]
+
+
 def test_many_modes_give_the_same_bytes_for_any_number_of_threads(many):
     for jobs in (1, 2):
         tvse("run", many / "run.toml", "--jobs", jobs, "--output", many / f"jobs{jobs}")

@@ -195,11 +195,10 @@ impl Spectrum {
     }
 
     /// The poles of the model with its full part, from those without it: each by its residual, and complete since their
-    /// discs do not meet and their sum is that of the first-order changes, which is that of all (a trace).
+    /// discs do not meet and their sum is that of the first-order changes, which is that of all (a trace). Repeated poles
+    /// stay as they are where the full part does not act on their vectors, of which those found are one that stands for
+    /// all: that of a right-hand side of no order.
     fn refine(&mut self, without: &[Bounded]) -> Result<Vec<Bounded>, Uncertain> {
-        if without.iter().any(|pole| pole.multiplicity > 1) {
-            return Err(Uncertain::Unresolved);
-        }
         let mut found = Vec::with_capacity(without.len());
         let (mut lacking, mut allowed) = (0.0, 0.0);
         self.groups.resize_with(without.len().div_ceil(WIDTH), Refined::default);
@@ -217,7 +216,16 @@ impl Spectrum {
                 lacking += times * (root.re - start.root.re - shift.re[lane]);
                 let size = shift.re[lane].hypot(shift.im[lane]);
                 allowed += times * (bound + start.bound + TRACE * size);
-                found.push(Bounded { root, bound, multiplicity: 1 });
+                let multiplicity = start.multiplicity;
+                if multiplicity == 1 {
+                    found.push(Bounded { root, bound, multiplicity });
+                } else {
+                    let bound = bound + (root - start.root).norm();
+                    if !(bound <= start.bound) {
+                        return Err(Uncertain::Unresolved);
+                    }
+                    found.push(Bounded { bound: bound + start.bound, ..*start });
+                }
             }
         }
         found.sort_by(|a, b| a.root.im.total_cmp(&b.root.im).then(a.root.re.total_cmp(&b.root.re)));
@@ -225,7 +233,9 @@ impl Spectrum {
         for (index, a) in found.iter().enumerate() {
             let near = found[index + 1..].iter();
             let near = near.take_while(|b| b.root.im - a.root.im <= a.bound + largest);
-            let meets = |b: &Bounded| !((a.root - b.root).norm() > a.bound + b.bound);
+            // Poles of one cluster are counted already.
+            let one = |b: &Bounded| b.multiplicity > 1 && b.multiplicity == a.multiplicity;
+            let meets = |b: &Bounded| !(one(b) || (a.root - b.root).norm() > a.bound + b.bound);
             if near.into_iter().any(meets) || (a.root.im != 0.0 && !(a.root.im > a.bound)) {
                 return Err(Uncertain::Unresolved);
             }
