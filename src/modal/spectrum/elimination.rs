@@ -5,7 +5,9 @@
 
 use super::lanes::{Complex, Complexes, Vector, WIDTH};
 use super::scaled::{self, Scaled};
+use super::sparsity::{Lists, Pattern, Ragged};
 use faer::c64;
+use std::ops::Range;
 
 /// Multiplier of a row beyond which rows are exchanged, squared.
 const LARGEST_MULTIPLIER: f64 = 64.0;
@@ -62,113 +64,6 @@ pub struct Determinants {
     pub value: [Scaled; WIDTH],
     /// Bounds.
     pub error: [f64; WIDTH],
-}
-
-/// A bit for each element of a matrix, row by row.
-#[derive(Clone, Default)]
-struct Pattern {
-    words: usize,
-    bits: Vec<u64>,
-}
-
-impl Pattern {
-    fn new(size: usize) -> Self {
-        let words = size.div_ceil(64);
-        Self { words, bits: vec![0; size * words] }
-    }
-
-    #[inline(always)]
-    fn row(&self, row: usize) -> &[u64] {
-        &self.bits[row * self.words..][..self.words]
-    }
-
-    #[inline(always)]
-    fn has(&self, row: usize, column: usize) -> bool {
-        self.bits[row * self.words + column / 64] >> (column % 64) & 1 == 1
-    }
-
-    #[inline(always)]
-    fn set(&mut self, row: usize, column: usize) {
-        self.bits[row * self.words + column / 64] |= 1 << (column % 64);
-    }
-
-    /// Sets the columns from `first` on and before `end`.
-    #[inline(always)]
-    fn set_from(&mut self, row: usize, first: usize, end: usize) {
-        for word in first / 64..self.words {
-            let low = u64::MAX << first.saturating_sub(64 * word);
-            let count = end - 64 * word;
-            let high = if count < 64 { (1 << count) - 1 } else { u64::MAX };
-            self.bits[row * self.words + word] |= low & high;
-        }
-    }
-
-    /// The columns of a row from `first` on and before `end`.
-    #[inline(always)]
-    fn columns(&self, row: usize, first: usize, end: usize) -> impl Iterator<Item = usize> {
-        let (mut word, end) = (first / 64, end.min(64 * self.words));
-        let words = self.row(row);
-        let mut left = words.get(word).map_or(0, |start| start & (u64::MAX << (first % 64)));
-        std::iter::from_fn(move || {
-            while left == 0 {
-                word += 1;
-                left = *words.get(word)?;
-            }
-            let column = 64 * word + left.trailing_zeros() as usize;
-            left &= left - 1;
-            (column < end).then_some(column)
-        })
-    }
-}
-
-/// Columns of factors that are not zero by structure: for each row those of sparse columns on the left of its
-/// diagonal, and for each sparse row those on the right.
-#[derive(Clone, Default)]
-struct Lists {
-    lower: Ragged,
-    upper: Ragged,
-}
-
-/// Lists one after the other.
-#[derive(Clone, Default)]
-struct Ragged {
-    ranges: Vec<[usize; 2]>,
-    items: Vec<usize>,
-}
-
-impl Ragged {
-    fn clear(&mut self, count: usize) {
-        self.ranges.clear();
-        self.ranges.resize(count, [0; 2]);
-        self.items.clear();
-    }
-
-    fn set(&mut self, index: usize, items: impl Iterator<Item = usize>) {
-        let first = self.items.len();
-        self.items.extend(items);
-        self.ranges[index] = [first, self.items.len()];
-    }
-
-    #[inline(always)]
-    fn get(&self, index: usize) -> &[usize] {
-        let [first, last] = self.ranges[index];
-        &self.items[first..last]
-    }
-}
-
-impl Lists {
-    /// Those of a pattern whose rows are at these places.
-    fn take(&mut self, pattern: &Pattern, rows: &[usize], sparse: usize) {
-        let n = rows.len();
-        self.lower.clear(n);
-        self.upper.clear(n);
-        for (place, &row) in rows.iter().enumerate() {
-            self.lower.set(row, pattern.columns(row, 0, place.min(sparse)));
-            if place < sparse {
-                self.upper.set(row, pattern.columns(row, place + 1, n));
-            }
-        }
-    }
 }
 
 /// At least the modulus, at most √2 of it.
@@ -246,7 +141,7 @@ impl Elimination {
         self.sparse = sparse;
         // The pattern before is in `filled`, which every run sets anew.
         std::mem::swap(&mut self.structure, &mut self.filled);
-        self.structure.bits.fill(0);
+        self.structure.clear();
         for row in 0..size {
             for column in 0..size {
                 if nonzero(row, column) {
@@ -254,7 +149,7 @@ impl Elimination {
                 }
             }
         }
-        if !known || self.structure.bits != self.filled.bits {
+        if !known || self.structure != self.filled {
             self.plan();
         }
     }
@@ -263,7 +158,7 @@ impl Elimination {
     fn plan(&mut self) {
         let (n, sparse) = (self.size, self.sparse);
         let planned = &mut self.planned;
-        planned.bits.copy_from_slice(&self.structure.bits);
+        planned.copy_from(&self.structure);
         for k in 0..sparse {
             for row in k + 1..n {
                 if planned.has(row, k) {
@@ -306,7 +201,7 @@ impl Elimination {
         for &at in &self.missing {
             self.matrix[at] = Complexes::ZERO;
         }
-        self.filled.bits.copy_from_slice(&self.planned.bits);
+        self.filled.copy_from(&self.planned);
         self.exchanged = false;
         let mut product = scaled::Product::<V>::new();
         let mut sign = [1.0; WIDTH];
@@ -411,19 +306,11 @@ impl Elimination {
     /// Gives a row the columns of another from `first` on that it has not: zeros.
     #[inline(always)]
     fn fill_missing(&mut self, row: usize, other: usize, first: usize) {
-        let words = self.filled.words;
-        for word in first / 64..words {
-            let low = first.saturating_sub(64 * word);
-            let theirs = self.filled.bits[other * words + word] & (u64::MAX << low);
-            let mut missing = theirs & !self.filled.bits[row * words + word];
-            self.exchanged |= missing != 0;
-            self.filled.bits[row * words + word] |= theirs;
-            while missing != 0 {
-                let column = 64 * word + missing.trailing_zeros() as usize;
-                self.matrix[row * self.size + column] = Complexes::ZERO;
-                missing &= missing - 1;
-            }
-        }
+        let Self { size, matrix, filled, exchanged, .. } = self;
+        filled.add_row(row, other, first, |column| {
+            *exchanged = true;
+            matrix[row * *size + column] = Complexes::ZERO;
+        });
     }
 
     /// Eliminates a dense column: what all columns left of it contribute, four rows at a time (Crout).
@@ -601,11 +488,11 @@ impl Elimination {
                 column[i].im[lane] = from.im[lane];
             }
             let sum = Complex::<V>::load(&column[i]);
-            factors.without_left(i, sum, column).store(&mut column[i]);
+            factors.without(i, factors.left(i), sum, column).store(&mut column[i]);
         }
         for k in (0..factors.rows.len()).rev() {
             let sum = Complex::<V>::load(&column[k]);
-            let sum = factors.without_right(k, sum, to);
+            let sum = factors.without(k, factors.right(k), sum, to);
             sum.mul(Complex::load(&factors.row(k)[k])).store(&mut to[k]);
         }
     }
@@ -621,11 +508,11 @@ impl Elimination {
             let inverse = Complex::load(&factors.row(i)[i]);
             let a = Complex::<V>::load(&column[i]).mul(inverse);
             a.store(&mut column[i]);
-            factors.spread_right(i, a, column);
+            factors.spread(i, factors.right(i), a, column);
         }
         for i in (0..factors.rows.len()).rev() {
             let b = Complex::<V>::load(&column[i]);
-            factors.spread_left(i, b, column);
+            factors.spread(i, factors.left(i), b, column);
             for (lane, &row) in origin[i].iter().enumerate() {
                 let row = usize::from(row);
                 to[row].re[lane] = column[i].re[lane];
@@ -668,8 +555,8 @@ impl Elimination {
         let mut across = Complex::<V>::splat(0.0, 0.0);
         for k in (0..n).rev() {
             let sum = Complex::<V>::load(&column[k]);
-            let sum = factors.without_right(k, sum, column);
-            let weight = factors.moduli_right::<V>(k, of_right);
+            let sum = factors.without(k, factors.right(k), sum, column);
+            let weight = factors.moduli(k, factors.right(k), V::splat(0.0), of_right);
             let inverse = Complex::<V>::load(&factors.row(k)[k]);
             let v = sum.mul(inverse);
             v.store(&mut column[k]);
@@ -683,7 +570,7 @@ impl Elimination {
         // |L||U||v|.
         for i in (0..n).rev() {
             let sum = V::load(&of_factors[i]);
-            factors.moduli_left(i, sum, of_factors).store(&mut of_factors[i]);
+            factors.moduli(i, factors.left(i), sum, of_factors).store(&mut of_factors[i]);
         }
         // y: with Uᵀ from the first place, then with Lᵀ from the last.
         for (k, value) in column.iter_mut().enumerate() {
@@ -694,12 +581,12 @@ impl Elimination {
             let inverse = Complex::load(&factors.row(i)[i]);
             let a = Complex::<V>::load(&column[i]).mul(inverse);
             a.store(&mut column[i]);
-            factors.spread_right(i, a, column);
+            factors.spread(i, factors.right(i), a, column);
         }
         let mut eliminated = V::splat(0.0);
         for i in (0..n).rev() {
             let b = Complex::<V>::load(&column[i]);
-            factors.spread_left(i, b, column);
+            factors.spread(i, factors.left(i), b, column);
             let size = modulus(b);
             eliminated = size.mul_add(V::load(&of_factors[i]), eliminated);
             let mut stored = [0.0; WIDTH];
@@ -731,6 +618,9 @@ impl Elimination {
     }
 }
 
+/// Columns of a row of factors: a list, and a range.
+type Columns<'a> = (&'a [usize], Range<usize>);
+
 /// Factors, read by place.
 struct Factors<'a> {
     matrix: &'a [Complexes],
@@ -746,110 +636,73 @@ impl Factors<'_> {
         &self.matrix[self.rows[place] * n..][..n]
     }
 
-    /// Sparse columns on the left of the diagonal; the first of the dense ones.
+    /// Columns on the left of the diagonal: sparse ones listed, dense ones in a range.
     #[inline(always)]
-    fn left(&self, place: usize) -> (&[usize], usize) {
-        (self.lists.lower.get(self.rows[place]), self.sparse.min(place))
+    fn left(&self, place: usize) -> Columns<'_> {
+        (self.lists.lower.get(self.rows[place]), self.sparse.min(place)..place)
     }
 
-    /// Columns of a sparse row on the right of the diagonal; the first of the dense ones of a dense row.
+    /// Columns on the right of the diagonal: those of a sparse row listed, of a dense one in a range.
     #[inline(always)]
-    fn right(&self, place: usize) -> (&[usize], usize) {
-        let dense = if place < self.sparse { self.rows.len() } else { place + 1 };
-        (self.lists.upper.get(self.rows[place]), dense)
+    fn right(&self, place: usize) -> Columns<'_> {
+        let n = self.rows.len();
+        let dense = if place < self.sparse { n } else { place + 1 };
+        (self.lists.upper.get(self.rows[place]), dense..n)
     }
 
-    /// `sum − Σ l_ik x_k`.
+    /// `sum − Σ a_ij x_j` over some columns.
     #[inline(always)]
-    fn without_left<V: Vector>(
+    fn without<V: Vector>(
         &self,
         place: usize,
+        (listed, dense): Columns,
         mut sum: Complex<V>,
         x: &[Complexes],
     ) -> Complex<V> {
         let row = self.row(place);
-        let (listed, first) = self.left(place);
-        for &k in listed {
-            sum = sum.subtract_product(Complex::load(&row[k]), Complex::load(&x[k]));
-        }
-        for (l, x) in row[first..place].iter().zip(&x[first..place]) {
-            sum = sum.subtract_product(Complex::load(l), Complex::load(x));
-        }
-        sum
-    }
-
-    /// `sum − Σ u_kj x_j`.
-    #[inline(always)]
-    fn without_right<V: Vector>(
-        &self,
-        place: usize,
-        mut sum: Complex<V>,
-        x: &[Complexes],
-    ) -> Complex<V> {
-        let row = self.row(place);
-        let (listed, first) = self.right(place);
         for &j in listed {
             sum = sum.subtract_product(Complex::load(&row[j]), Complex::load(&x[j]));
         }
-        for (u, x) in row[first..].iter().zip(&x[first..]) {
-            sum = sum.subtract_product(Complex::load(u), Complex::load(x));
+        for (a, x) in row[dense.clone()].iter().zip(&x[dense]) {
+            sum = sum.subtract_product(Complex::load(a), Complex::load(x));
         }
         sum
     }
 
-    /// `x_k −= l_ik b`.
+    /// `x_j −= a_ij b` over some columns.
     #[inline(always)]
-    fn spread_left<V: Vector>(&self, place: usize, b: Complex<V>, x: &mut [Complexes]) {
+    fn spread<V: Vector>(
+        &self,
+        place: usize,
+        (listed, dense): Columns,
+        b: Complex<V>,
+        x: &mut [Complexes],
+    ) {
         let row = self.row(place);
-        let (listed, first) = self.left(place);
-        for &k in listed {
-            let value = Complex::<V>::load(&x[k]);
-            value.subtract_product(b, Complex::load(&row[k])).store(&mut x[k]);
-        }
-        for (l, x) in row[first..place].iter().zip(&mut x[first..place]) {
-            Complex::<V>::load(x).subtract_product(b, Complex::load(l)).store(x);
-        }
-    }
-
-    /// `x_j −= u_kj a`.
-    #[inline(always)]
-    fn spread_right<V: Vector>(&self, place: usize, a: Complex<V>, x: &mut [Complexes]) {
-        let row = self.row(place);
-        let (listed, first) = self.right(place);
         for &j in listed {
             let value = Complex::<V>::load(&x[j]);
-            value.subtract_product(a, Complex::load(&row[j])).store(&mut x[j]);
+            value.subtract_product(b, Complex::load(&row[j])).store(&mut x[j]);
         }
-        for (u, x) in row[first..].iter().zip(&mut x[first..]) {
-            Complex::<V>::load(x).subtract_product(a, Complex::load(u)).store(x);
+        for (a, x) in row[dense.clone()].iter().zip(&mut x[dense]) {
+            Complex::<V>::load(x).subtract_product(b, Complex::load(a)).store(x);
         }
     }
 
-    /// `sum + Σ |l_ik| x_k`.
+    /// `sum + Σ |a_ij| x_j` over some columns.
     #[inline(always)]
-    fn moduli_left<V: Vector>(&self, place: usize, mut sum: V, x: &[[f64; WIDTH]]) -> V {
+    fn moduli<V: Vector>(
+        &self,
+        place: usize,
+        (listed, dense): Columns,
+        mut sum: V,
+        x: &[[f64; WIDTH]],
+    ) -> V {
         let row = self.row(place);
-        let (listed, first) = self.left(place);
-        for &k in listed {
-            sum = modulus(Complex::<V>::load(&row[k])).mul_add(V::load(&x[k]), sum);
-        }
-        for (l, x) in row[first..place].iter().zip(&x[first..place]) {
-            sum = modulus(Complex::<V>::load(l)).mul_add(V::load(x), sum);
-        }
-        sum
-    }
-
-    /// `Σ |u_kj| x_j`.
-    #[inline(always)]
-    fn moduli_right<V: Vector>(&self, place: usize, x: &[[f64; WIDTH]]) -> V {
-        let mut sum = V::splat(0.0);
-        let row = self.row(place);
-        let (listed, first) = self.right(place);
         for &j in listed {
             sum = modulus(Complex::<V>::load(&row[j])).mul_add(V::load(&x[j]), sum);
         }
-        for (u, x) in row[first..].iter().zip(&x[first..]) {
-            sum = modulus(Complex::<V>::load(u)).mul_add(V::load(x), sum);
+        for (a, x) in row[dense.clone()].iter().zip(&x[dense]) {
+            sum = modulus(Complex::<V>::load(a)).mul_add(V::load(x), sum);
         }
         sum
     }

@@ -13,6 +13,7 @@ mod reduction;
 mod refine;
 mod scaled;
 mod secular;
+mod sparsity;
 
 pub use predict::Base;
 pub use secular::{Bounded, Uncertain};
