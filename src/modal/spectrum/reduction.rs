@@ -33,7 +33,7 @@ const LEAST_MODES: usize = 16;
 /// Most coordinates of a model with a full part that are not reduced.
 const MOST_WHOLE: usize = 48;
 /// Largest part of the terms of a product that may be left out; what is counts as rounding.
-const LEFT_OUT: f64 = 1e-12;
+const LEFT_OUT: f64 = 4e-12;
 
 /// The interface of one model.
 #[derive(Debug, Default)]
