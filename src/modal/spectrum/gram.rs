@@ -25,7 +25,7 @@ pub struct Gram {
     moduli: Vec<[f64; WIDTH]>,
     /// What rounding may have done to each e, in units of the unit roundoff.
     doubt: Vec<[f64; WIDTH]>,
-    /// The motions for which the products are.
+    /// The motions, for which the products are.
     motions: Vec<f64>,
     /// Row and column of the elements of G on and above its diagonal, and for each block of them and each elastic
     /// coordinate the products of the two motions; zeros end the last block.
@@ -158,24 +158,15 @@ impl Gram {
     /// What rounding of the e may do to a determinant near zero, in units of the unit roundoff and of it: with the
     /// right and left forces of its null vectors on the motions, and the modulus of what normalises these.
     #[inline(always)]
-    pub fn rounding<V: Vector>(
-        &self,
-        motions: &[f64],
-        right: &[Complexes],
-        left: &[Complexes],
-        across: V,
-    ) -> V {
+    pub fn rounding<V: Vector>(&self, right: &[Complexes], left: &[Complexes], across: V) -> V {
         let mut own = V::splat(0.0);
         let mut shared = V::splat(0.0);
         let modes = self.weights.len();
         for first in (0..modes).step_by(BLOCK) {
-            let right = forces_on::<V>(motions, self.stride, first, right);
-            let left = forces_on::<V>(motions, self.stride, first, left);
-            for i in 0..BLOCK {
+            let right = self.forces_on::<V>(first, right);
+            let left = self.forces_on::<V>(first, left);
+            for i in 0..BLOCK.min(modes - first) {
                 let mode = first + i;
-                if mode == modes {
-                    break;
-                }
                 // |bᵀf/e| of both.
                 let doubt = V::load(&self.doubt[mode]);
                 let size = V::load(&self.moduli[mode]);
@@ -186,34 +177,30 @@ impl Gram {
         }
         own.add(shared.div(across))
     }
-}
 
-/// The forces `bᵀ f` on a block of elastic coordinates, b their rows of motions and f forces on these; beyond the last
-/// coordinate those on it.
-#[inline(always)]
-pub fn forces_on<V: Vector>(
-    motions: &[f64],
-    stride: usize,
-    first: usize,
-    forces: &[Complexes],
-) -> [Complex<V>; BLOCK] {
-    let (count, last) = (forces.len(), motions.len() / stride - 1);
-    let mut starts = [0; BLOCK];
-    for i in 0..BLOCK {
-        starts[i] = (first + i).min(last) * stride;
-    }
-    let rows = [
-        &motions[starts[0]..][..count],
-        &motions[starts[1]..][..count],
-        &motions[starts[2]..][..count],
-        &motions[starts[3]..][..count],
-    ];
-    let mut sums = [Complex::<V>::splat(0.0, 0.0); BLOCK];
-    for at in 0..count {
-        let force = Complex::<V>::load(&forces[at]);
+    /// The forces `bᵀ f` on a block of elastic coordinates, b their rows of motions and f forces on these; beyond the last
+    /// coordinate those on it.
+    #[inline(always)]
+    pub fn forces_on<V: Vector>(&self, first: usize, forces: &[Complexes]) -> [Complex<V>; BLOCK] {
+        let Self { motions, stride, .. } = self;
+        let (count, last) = (forces.len(), self.weights.len() - 1);
+        let mut starts = [0; BLOCK];
         for i in 0..BLOCK {
-            sums[i] = sums[i].add_real_product(V::splat(rows[i][at]), force);
+            starts[i] = (first + i).min(last) * stride;
         }
+        let rows = [
+            &motions[starts[0]..][..count],
+            &motions[starts[1]..][..count],
+            &motions[starts[2]..][..count],
+            &motions[starts[3]..][..count],
+        ];
+        let mut sums = [Complex::<V>::splat(0.0, 0.0); BLOCK];
+        for at in 0..count {
+            let force = Complex::<V>::load(&forces[at]);
+            for i in 0..BLOCK {
+                sums[i] = sums[i].add_real_product(V::splat(rows[i][at]), force);
+            }
+        }
+        sums
     }
-    sums
 }

@@ -46,9 +46,8 @@ pub struct Spectrum {
     /// Determinants of a round with their errors.
     values: Vec<(Scaled, f64)>,
     evaluations: usize,
-    /// Poles of the last model with its full part and their vectors, group by group; whether it had one.
+    /// Poles of the last model with its full part and their vectors, group by group.
     groups: Vec<Refined>,
-    refined: bool,
     /// Poles whose vectors alone are asked for.
     aside: Refined,
     room: Room,
@@ -101,7 +100,6 @@ impl Spectrum {
             values: Vec::new(),
             evaluations: 0,
             groups: Vec::new(),
-            refined: false,
             aside: Refined::default(),
             room: Room::default(),
         }
@@ -191,8 +189,7 @@ impl Spectrum {
             self.secular.renew();
         }
         let found = self.secular.certify(elsewhere)?;
-        self.refined = self.pencil.reduction().is_full();
-        if self.refined { self.refine(&found) } else { Ok(found) }
+        if self.is_refined() { self.refine(&found) } else { Ok(found) }
     }
 
     /// The poles of the model with its full part, from those without it: each by its residual, and complete since their
@@ -231,28 +228,34 @@ impl Spectrum {
         }
         found.sort_by(|a, b| a.root.im.total_cmp(&b.root.im).then(a.root.re.total_cmp(&b.root.re)));
         let largest = found.iter().map(|pole| pole.bound).fold(0.0, f64::max);
+        // Each disc meets those of its own cluster and no other.
+        let mut met = vec![1; found.len()];
         for (index, a) in found.iter().enumerate() {
-            let near = found[index + 1..].iter();
-            let near = near.take_while(|b| b.root.im - a.root.im <= a.bound + largest);
-            // Poles of one cluster are counted already.
-            let one = |b: &Bounded| b.multiplicity > 1 && b.multiplicity == a.multiplicity;
-            let meets = |b: &Bounded| !(one(b) || (a.root - b.root).norm() > a.bound + b.bound);
-            if near.into_iter().any(meets) || (a.root.im != 0.0 && !(a.root.im > a.bound)) {
-                return Err(Uncertain::Unresolved);
+            let near = found[index + 1..].iter().enumerate();
+            for (at, b) in near.take_while(|(_, b)| b.root.im - a.root.im <= a.bound + largest) {
+                if !((a.root - b.root).norm() > a.bound + b.bound) {
+                    met[index] += 1;
+                    met[index + 1 + at] += 1;
+                }
             }
+        }
+        let counted = met.iter().zip(&found).all(|(met, pole)| *met == pole.multiplicity);
+        if !counted || found.iter().any(|a| a.root.im != 0.0 && !(a.root.im > a.bound)) {
+            return Err(Uncertain::Unresolved);
         }
         if lacking.abs() <= allowed { Ok(found) } else { Err(Uncertain::Contradicted) }
     }
 
     /// Right and left vectors of poles of `model`, the last one solved; none where it is not reduced.
     pub fn vectors(&mut self, model: &Model, poles: &[c64]) -> Vec<(c64, [Vec<c64>; 2])> {
-        let Self { level, pencil, groups, aside, room, refined, .. } = self;
+        let refined = self.is_refined();
+        let Self { level, pencil, groups, aside, room, .. } = self;
         if pencil.reduction().count == 0 || poles.is_empty() {
             return Vec::new();
         }
         let mut found = Vec::with_capacity(poles.len());
         for group in poles.chunks(WIDTH) {
-            if !*refined {
+            if !refined {
                 aside.find(*level, pencil, room, &pack(group));
             }
             for (lane, &pole) in group.iter().enumerate() {
@@ -262,7 +265,7 @@ impl Spectrum {
                 let known = groups
                     .iter()
                     .find_map(|of| (0..WIDTH).find(|lane| is(of, *lane)).map(|lane| (of, lane)));
-                let (of, lane) = match *refined {
+                let (of, lane) = match refined {
                     true => match known {
                         Some(known) => known,
                         None => continue,
@@ -278,7 +281,7 @@ impl Spectrum {
 
     /// Whether the last poles are known by their residuals, not by discs that hold all roots.
     pub fn is_refined(&self) -> bool {
-        self.refined
+        self.pencil.reduction().is_full()
     }
 }
 

@@ -11,7 +11,7 @@
 )]
 
 use super::elimination::{Determinants, Elimination};
-use super::gram::{Gram, forces_on};
+use super::gram::Gram;
 use super::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
 use super::reduction::{BLOCK, MOST_MOTIONS, Reduction};
 use super::scaled::{Product, Scaled};
@@ -210,7 +210,7 @@ impl Pencil {
         }
     }
 
-    /// Lists the entries of motions that are not zero, and has the leading coefficient evaluated anew.
+    /// Lists the entries that are not zero, those of motions by column.
     fn list(&mut self) {
         let (size, others) = (self.size, self.order.len());
         self.first.clear();
@@ -448,11 +448,11 @@ impl Pencil {
             Complex::<V>::load(&self.elimination.left[i]).scale(rows).store(&mut left[i]);
         }
         let minus = V::splat(-1.0);
-        let Reduction { motions, stride, own, .. } = &self.reduction;
-        for first in (0..own.len()).step_by(BLOCK) {
-            let from_right = forces_on::<V>(motions, *stride, first, &self.forces[0]);
-            let from_left = forces_on::<V>(motions, *stride, first, &self.forces[1]);
-            for i in 0..BLOCK.min(own.len() - first) {
+        let modes = self.reduction.own.len();
+        for first in (0..modes).step_by(BLOCK) {
+            let from_right = self.gram.forces_on::<V>(first, &self.forces[0]);
+            let from_left = self.gram.forces_on::<V>(first, &self.forces[1]);
+            for i in 0..BLOCK.min(modes - first) {
                 let (mode, place) = (first + i, others + first + i);
                 let weight = self.gram.weight::<V>(mode);
                 from_right[i].mul(weight).scale(minus).store(&mut right[place]);
@@ -518,10 +518,10 @@ impl Pencil {
                 Complex::<V>::load(sum).add_product(value, x).store(sum);
             }
         }
-        let Reduction { count, stride, own, motions, .. } = &self.reduction;
+        let Reduction { count, own, .. } = &self.reduction;
         for first in (0..own.len()).step_by(BLOCK) {
             for n in 0..N {
-                let sums = forces_on::<V>(motions, *stride, first, &forces[n][..*count]);
+                let sums = self.gram.forces_on::<V>(first, &forces[n][..*count]);
                 for i in 0..BLOCK.min(own.len() - first) {
                     let mode = first + i;
                     let own = value::<V>(own[mode], at[n].powers[0][0]);
@@ -603,10 +603,10 @@ impl Pencil {
     /// `(r + sign Bᵀ f)/e`, in place.
     #[inline(always)]
     fn substitute<V: Vector>(&self, forces: &[Complexes], sign: V, r: &mut [Complexes]) {
-        let Reduction { motions, stride, own, .. } = &self.reduction;
-        for first in (0..own.len()).step_by(BLOCK) {
-            let forces = forces_on::<V>(motions, *stride, first, forces);
-            for i in 0..BLOCK.min(own.len() - first) {
+        let modes = self.reduction.own.len();
+        for first in (0..modes).step_by(BLOCK) {
+            let forces = self.gram.forces_on::<V>(first, forces);
+            for i in 0..BLOCK.min(modes - first) {
                 let r = &mut r[first + i];
                 let sum = Complex::<V>::load(r).add_real_product(sign, forces[i]);
                 sum.mul(self.gram.weight::<V>(first + i)).store(r);
@@ -914,19 +914,7 @@ fn condense<V: Vector>(pencil: &mut Pencil, at: &Frequencies<V>) {
 /// with the null vectors that elimination found.
 #[inline(always)]
 fn doubt<V: Vector>(pencil: &mut Pencil) -> V {
-    let Pencil {
-        size,
-        order,
-        reduction,
-        gram,
-        first,
-        rows,
-        values,
-        lanes,
-        elimination,
-        forces,
-        ..
-    } = pencil;
+    let Pencil { size, order, gram, first, rows, values, lanes, elimination, forces, .. } = pencil;
     let others = order.len();
     let count = *size - others;
     for forces in forces.iter_mut() {
@@ -946,7 +934,7 @@ fn doubt<V: Vector>(pencil: &mut Pencil) -> V {
         y.scale(row_scale).store(&mut forces[1][i]);
     }
     let across = V::load(&elimination.across);
-    gram.rounding::<V>(&reduction.motions, &forces[0], &forces[1], across)
+    gram.rounding::<V>(&forces[0], &forces[1], across)
 }
 
 /// The powers at a modulus.
