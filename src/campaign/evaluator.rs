@@ -118,10 +118,10 @@ struct Workspace<'a> {
 }
 
 /// Buffers for models of one size.
-struct Buffers {
-    model: Model,
+pub(super) struct Buffers {
+    pub(super) model: Model,
     scratch: Model,
-    solver: Solver,
+    pub(super) solver: Solver,
     spectrum: Spectrum,
     /// Proven bounds of the poles, rad/s; none where they were solved densely.
     bounds: Vec<f64>,
@@ -287,12 +287,11 @@ impl<'a> Evaluator<'a> {
     ) -> Option<Result<Loops, Failure>> {
         let (open, plan) =
             (at.variants[variant].loops.as_ref()?, self.definition.margins.as_ref()?);
-        let Buffers { model, solver, spectrum, .. } = Buffers::of(buffers, open.coordinates());
-        let found = drawn.clone().and_then(|()| {
-            let room = (&mut *model, &mut *solver, spectrum);
-            open.assess(vehicle, room, poles, plan, &plan.envelope_hz)
-        });
-        Some(found.map(|found| open.store(&found, model, solver, plan)))
+        let buffers = Buffers::of(buffers, open.coordinates());
+        let found = drawn
+            .clone()
+            .and_then(|()| open.assess(vehicle, buffers, poles, plan, &plan.envelope_hz));
+        Some(found.map(|found| open.store(&found, buffers, plan)))
     }
 
     /// Assesses the loops of one case at a flight time and in a variant (indices of the definition), with
@@ -324,8 +323,8 @@ impl<'a> Evaluator<'a> {
         if self.solve(at, &place, (variant, false), closed, poles).is_err() {
             poles.clear();
         }
-        let Buffers { model, solver, spectrum, .. } = Buffers::of(buffers, open.coordinates());
-        open.assess(vehicle, (model, solver, spectrum), poles, plan, &plan.envelope_hz).map(Some)
+        let buffers = Buffers::of(buffers, open.coordinates());
+        open.assess(vehicle, buffers, poles, plan, &plan.envelope_hz).map(Some)
     }
 
     /// Builds the model of the nominal vehicle at a flight time and in a variant (indices of the
@@ -491,7 +490,7 @@ impl<'a> Evaluator<'a> {
 
 /// All poles of the model in `buffers`: by its base where there is one and they can be certified, else
 /// densely.
-fn find_poles(
+pub(super) fn find_poles(
     base: Option<&Base>,
     buffers: &mut Buffers,
     poles: &mut Vec<Complex<f64>>,

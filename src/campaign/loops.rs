@@ -4,12 +4,13 @@
 //! What margins are is decided in `margins`; which variants have them by the run definition.
 
 use super::definition::{Definition, LoopPlan, Variant};
+use super::evaluator::{Buffers, find_poles};
 use super::plant::{self, Extent};
 use super::{Failure, FailureKind};
 use crate::dynamics::servo::{self, Row};
 use crate::dynamics::{DrawnVehicle, Effects, Feedback, Model, Plant, Servo};
 use crate::margins::{self, Assessment, AxisMargins, Peak, assess};
-use crate::modal::spectrum::{Base, Spectrum};
+use crate::modal::spectrum::Base;
 use crate::modal::{Reference, Response, Solver};
 use crate::vehicle::{ModeSet, Vehicle};
 use nalgebra::{Complex, DMatrix, Matrix3};
@@ -92,16 +93,15 @@ impl OpenLoop {
         self.plant.layout.coordinates()
     }
 
-    /// Assesses the loops of a drawn vehicle; the model of the open loops stays in `model`, whose size is
-    /// that of `solver` and `spectrum`. `closed` are the poles of the closed loop, `wanted_hz` frequencies at which the
-    /// curve shall have a sample.
+    /// Assesses the loops of a drawn vehicle; the model of the open loops stays in `buffers`, which are of its size.
+    /// `closed` are the poles of the closed loop, `wanted_hz` frequencies at which the curve shall have a sample.
     ///
     /// # Errors
     /// A model that cannot be solved, or loops that cannot be followed.
-    pub fn assess(
+    pub(super) fn assess(
         &self,
         drawn: &DrawnVehicle,
-        (model, solver, spectrum): (&mut Model, &mut Solver, &mut Spectrum),
+        buffers: &mut Buffers,
         closed: &[Complex<f64>],
         plan: &LoopPlan,
         wanted_hz: &[f64],
@@ -109,12 +109,10 @@ impl OpenLoop {
         let Plant { layout, servo, .. } = &self.plant;
         let servo = servo.as_ref().expect("an open loop has a servo part");
         let (autopilot, law) = servo.autopilot().expect("an open loop has an autopilot");
-        self.plant.assemble(drawn, &self.effects, model);
-        let certified = self.base.as_ref().and_then(|base| spectrum.solve(base, model).ok());
-        let mut poles: Vec<_> = certified.iter().flatten().map(|pole| pole.root).collect();
-        if certified.is_none() {
-            solver.poles(model, &mut poles).map_err(|error| Failure::from(&error))?;
-        }
+        self.plant.assemble(drawn, &self.effects, &mut buffers.model);
+        let mut poles = Vec::new();
+        find_poles(self.base.as_ref(), buffers, &mut poles)?;
+        let Buffers { model, solver, .. } = buffers;
         // Axis commands are the first external inputs.
         let inputs = servo.inputs(&servo.compose(drawn), layout).columns(0, 3).into_owned();
         let signals = law.signals().iter();
@@ -151,14 +149,14 @@ impl OpenLoop {
             .map_err(|error| Failure::new(FailureKind::Loop, error.to_string()))
     }
 
-    /// What is stored of an assessment; `model` and `solver` are those it was made with.
-    pub fn store(
+    /// What is stored of an assessment; `buffers` are those it was made with.
+    pub(super) fn store(
         &self,
         found: &Assessment,
-        model: &Model,
-        solver: &mut Solver,
+        buffers: &mut Buffers,
         plan: &LoopPlan,
     ) -> Loops {
+        let Buffers { model, solver, .. } = buffers;
         let motions = self.plant.layout.motions();
         let mut named: Option<(Complex<f64>, String)> = None;
         let mut peaks = Vec::new();

@@ -266,7 +266,7 @@ impl Secular {
         let slots: Vec<usize> =
             (0..self.node.len()).filter(|slot| self.mirror[*slot].is_none()).collect();
         for group in slots.chunks(WIDTH) {
-            let product = level.run(Products { secular: self, group });
+            let product = level.run(Products { secular: self, slots: group });
             for (&slot, product) in group.iter().zip(product) {
                 let (value, error) = self.value[slot];
                 let value = value.over(product).value();
@@ -290,11 +290,14 @@ impl Secular {
         for _ in 0..MOST_SWEEPS {
             let mut left = 0;
             for first in (0..moving.len()).step_by(WIDTH) {
-                let mut group = [0; WIDTH];
-                let group = &mut group[..(moving.len() - first).min(WIDTH)];
-                group.copy_from_slice(&moving[first..first + group.len()]);
-                let step = level.run(Step { secular: self, group });
-                for (lane, &index) in group.iter().enumerate() {
+                let count = (moving.len() - first).min(WIDTH);
+                let mut slots = [0; WIDTH];
+                for (slot, index) in slots.iter_mut().zip(&moving[first..]) {
+                    *slot = self.roots[*index].own;
+                }
+                let step = level.run(Step { secular: self, slots: &slots[..count] });
+                for lane in 0..count {
+                    let index = moving[first + lane];
                     let Root { own, partner } = self.roots[index];
                     let mut step = c64::new(step.re[lane], step.im[lane]);
                     if partner.is_none() {
@@ -378,10 +381,10 @@ impl Secular {
 
     /// |V| of every root, with its error.
     fn measure(&mut self, level: Level) {
-        for first in (0..self.roots.len()).step_by(WIDTH) {
-            let last = (first + WIDTH).min(self.roots.len());
-            let radius = level.run(Measure { secular: self, first, last });
-            self.radius[first..last].copy_from_slice(&radius[..last - first]);
+        let slots: Vec<usize> = self.roots.iter().map(|root| root.own).collect();
+        for (group, slots) in slots.chunks(WIDTH).enumerate() {
+            let radius = level.run(Measure { secular: self, slots });
+            self.radius[group * WIDTH..][..slots.len()].copy_from_slice(&radius[..slots.len()]);
         }
     }
 
@@ -524,7 +527,7 @@ fn zero_in<V: Vector>(lane: Option<usize>, value: f64) -> V {
 /// Products of the distances of nodes from all others.
 struct Products<'a> {
     secular: &'a Secular,
-    group: &'a [usize],
+    slots: &'a [usize],
 }
 
 impl Kernel for Products<'_> {
@@ -532,8 +535,8 @@ impl Kernel for Products<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> Self::Output {
-        let Self { secular, group } = self;
-        let group = Group::of(secular, group);
+        let Self { secular, slots } = self;
+        let group = Group::of(secular, slots);
         let own = Complex::<V>::load(&group.node);
         let mut product = Product::<V>::new();
         let mut next = 0;
@@ -566,6 +569,31 @@ impl Secular {
     }
 }
 
+/// A sum over slots.
+trait Sum<V> {
+    /// Adds a slot for the roots at `node + h`; to one of them, in this lane, it belongs itself.
+    fn add(&mut self, slot: Slot, node: Complex<V>, h: Complex<V>, lane: Option<usize>);
+}
+
+impl Group {
+    /// Adds all slots for the roots of this group.
+    #[inline(always)]
+    fn sum<V: Vector, S: Sum<V>>(&self, secular: &Secular, mut sum: S) -> S {
+        let (node, h) = (Complex::load(&self.node), Complex::load(&self.offset));
+        let mut next = 0;
+        for &(own, lane) in &self.own[..=self.count] {
+            for slot in secular.slots(next..own) {
+                sum.add(slot, node, h, None);
+            }
+            if let Some(slot) = secular.slots(own..secular.node.len()).next() {
+                sum.add(slot, node, h, Some(lane));
+            }
+            next = own + 1;
+        }
+        sum
+    }
+}
+
 /// x − z and x − x' of a slot, and the reciprocals of their squares, from one.
 struct Distances<V> {
     a: Complex<V>,
@@ -587,10 +615,10 @@ impl<V: Vector> Distances<V> {
     }
 }
 
-/// One step for a group of roots.
+/// One step for the roots of these slots.
 struct Step<'a> {
     secular: &'a Secular,
-    group: &'a [usize],
+    slots: &'a [usize],
 }
 
 /// F without the root's own term, its slope less that term's, and what other roots add to the slope.
@@ -600,7 +628,7 @@ struct Slopes<V> {
     others: Complex<V>,
 }
 
-impl<V: Vector> Slopes<V> {
+impl<V: Vector> Sum<V> for Slopes<V> {
     #[inline(always)]
     fn add(&mut self, slot: Slot, node: Complex<V>, h: Complex<V>, lane: Option<usize>) {
         let Distances { a, b, over_a, over_b, .. } = Distances::of(slot, node, h, lane);
@@ -628,27 +656,13 @@ impl Kernel for Step<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> Complexes {
-        let Self { secular, group } = self;
-        let mut slots = [0; WIDTH];
-        for (slot, root) in slots.iter_mut().zip(group) {
-            *slot = secular.roots[*root].own;
-        }
-        let group = Group::of(secular, &slots[..group.len()]);
-        let (node, h) = (Complex::<V>::load(&group.node), Complex::<V>::load(&group.offset));
+        let Self { secular, slots } = self;
+        let group = Group::of(secular, slots);
         let zero = Complex::<V>::splat(0.0, 0.0);
         let one = Complex::<V>::splat(1.0, 0.0);
-        let mut slopes = Slopes { sum: one, slope: zero, others: zero };
-        let mut next = 0;
-        for (own, lane) in group.own.into_iter().take(group.count + 1) {
-            for slot in secular.slots(next..own) {
-                slopes.add(slot, node, h, None);
-            }
-            if let Some(slot) = secular.slots(own..secular.node.len()).next() {
-                slopes.add(slot, node, h, Some(lane));
-            }
-            next = own + 1;
-        }
-        let Slopes { sum, slope, others } = slopes;
+        let slopes = Slopes { sum: one, slope: zero, others: zero };
+        let Slopes { sum, slope, others } = group.sum(secular, slopes);
+        let h = Complex::load(&group.offset);
         let value = Complex::<V>::load(&group.weight).add(h.mul(sum));
         let derivative = sum.add(h.mul(slope)).add(value.mul(others));
         let mut step = Complexes::ZERO;
@@ -657,11 +671,10 @@ impl Kernel for Step<'_> {
     }
 }
 
-/// |V| with its error for a group of roots.
+/// |V| with its error for the roots of these slots.
 struct Measure<'a> {
     secular: &'a Secular,
-    first: usize,
-    last: usize,
+    slots: &'a [usize],
 }
 
 /// F without the root's own term, the errors of its weights, moduli of its terms, and Π |x − z|²/|x − x'|².
@@ -672,7 +685,7 @@ struct Sizes<V> {
     ratio: Product<V>,
 }
 
-impl<V: Vector> Sizes<V> {
+impl<V: Vector> Sum<V> for Sizes<V> {
     #[inline(always)]
     fn add(&mut self, slot: Slot, node: Complex<V>, h: Complex<V>, lane: Option<usize>) {
         let Distances { a, over_a, over_b, size_a, .. } = Distances::of(slot, node, h, lane);
@@ -695,35 +708,19 @@ impl Kernel for Measure<'_> {
 
     #[inline(always)]
     fn run<V: Vector>(self) -> [f64; WIDTH] {
-        let Self { secular, first, last } = self;
-        let mut slots = [0; WIDTH];
-        for (slot, root) in slots.iter_mut().zip(&secular.roots[first..last]) {
-            *slot = root.own;
-        }
-        let slots = &slots[..last - first];
+        let Self { secular, slots } = self;
         let group = Group::of(secular, slots);
-        let (node, h) = (Complex::<V>::load(&group.node), Complex::<V>::load(&group.offset));
         let (zero, one) = (V::splat(0.0), V::splat(1.0));
         let sum = Complex { re: one, im: zero };
-        let mut sizes = Sizes { sum, error: zero, moduli: one, ratio: Product::new() };
-        let mut next = 0;
-        for (own, lane) in group.own.into_iter().take(group.count + 1) {
-            for slot in secular.slots(next..own) {
-                sizes.add(slot, node, h, None);
-            }
-            if let Some(slot) = secular.slots(own..secular.node.len()).next() {
-                sizes.add(slot, node, h, Some(lane));
-            }
-            next = own + 1;
-        }
-        let Sizes { sum, error, moduli, ratio } = sizes;
+        let sizes = Sizes { sum, error: zero, moduli: one, ratio: Product::new() };
+        let Sizes { sum, error, moduli, ratio } = group.sum(secular, sizes);
         let ratio = ratio.finish();
         let rounding = (secular.node.len() as f64 + 16.0) * f64::EPSILON;
         let mut stored = [[0.0; WIDTH]; 2];
         error.store(&mut stored[0]);
         moduli.store(&mut stored[1]);
         let mut value = Complexes::ZERO;
-        h.mul(sum).store(&mut value);
+        Complex::<V>::load(&group.offset).mul(sum).store(&mut value);
         let [error, moduli] = stored;
         let mut radius = [0.0; WIDTH];
         for (lane, &slot) in slots.iter().enumerate() {
