@@ -8,6 +8,7 @@
 
 #![expect(clippy::disallowed_methods, reason = "a benchmark reads the clock and writes files")]
 
+use nalgebra::Complex;
 use std::path::Path;
 use std::time::Instant;
 use tvse::campaign::Evaluator;
@@ -131,20 +132,26 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let structured = least(|| {
                     std::hint::black_box(spectrum.solve(&base, view.model).is_ok());
                 });
-                let found: Vec<_> =
-                    certified.iter().flatten().map(|pole| pole.root).collect();
-                let mut with_vectors = |count: usize| {
+                let mode = evaluator.times[time].variants[variant].references[0].predict(view.model);
+                let mut with_vectors = |near: Option<usize>| {
                     let mut given = 0;
                     let time = least(|| {
-                        let solved = spectrum.solve(&base, view.model).is_ok();
-                        let poles = &found[..count.min(found.len())];
-                        let vectors = spectrum.vectors(view.model, poles);
-                        given = std::hint::black_box((solved, vectors.len())).1;
+                        let found = match near {
+                            Some(count) => spectrum.solve_near(&base, view.model, &[mode], count),
+                            None => spectrum.solve(&base, view.model),
+                        };
+                        let mut poles: Vec<_> = found.iter().flatten().map(|p| p.root).collect();
+                        if let Some(count) = near {
+                            let distance = |pole: &Complex<f64>| (pole - mode).norm();
+                            poles.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+                            poles.truncate(count);
+                        }
+                        given = std::hint::black_box(spectrum.vectors(view.model, &poles).len());
                     });
                     // A model that is not reduced has none from its structure.
                     if given > 0 { time } else { f64::NAN }
                 };
-                let (some, all) = (with_vectors(16), with_vectors(usize::MAX));
+                let (some, all) = (with_vectors(Some(16)), with_vectors(None));
                 let kind = match (spectrum.is_refined(), certified.is_ok()) {
                     (_, false) => "none",
                     (true, _) => "residual",

@@ -4,6 +4,7 @@
 
 use super::definition::Solver;
 use super::evaluator::{Error, Evaluator};
+use super::record::Certificate;
 use super::{Definition, Pole, Span};
 use crate::dispersion::Sampler;
 use crate::vehicle::Vehicle;
@@ -72,11 +73,14 @@ pub fn audit(
     let [structured, dense] =
         definitions.each_ref().map(|definition| Evaluator::new(vehicle, sampler, definition, true));
     let (structured, dense) = (structured?, dense?);
+    // What a run does that stores no other poles: of a model with a full part it finds only some.
+    let near = Evaluator::new(vehicle, sampler, &definitions[0], false)?;
     let mut audit = Audit { cases: cases.len(), ..Audit::default() };
     for &(population, case) in cases {
-        let records = [&structured, &dense].map(|evaluator| evaluator.evaluate(population, case));
-        let [ours, theirs] = records.map(|record| record.evaluations);
-        for (ours, theirs) in ours.iter().zip(&theirs) {
+        let records =
+            [&structured, &dense, &near].map(|evaluator| evaluator.evaluate(population, case));
+        let [ours, theirs, near] = records.map(|record| record.evaluations);
+        for ((ours, theirs), near) in ours.iter().zip(&theirs).zip(&near) {
             let place = || {
                 let variant = &definition.variants[ours.variant].name;
                 let time = definition.flight_times_s[ours.flight_time];
@@ -89,6 +93,13 @@ pub fn audit(
                     if solver == Some(Solver::Structured) {
                         audit.evaluations += 1;
                         audit.compare(poles, others, place);
+                        if near.solution.map(|s| s.certificate) == Some(Certificate::Near) {
+                            let named = |poles: &[Pole]| -> Vec<Pole> {
+                                poles.iter().filter(|p| p.mode.is_some()).cloned().collect()
+                            };
+                            let near = near.outcome.as_deref().unwrap_or_default();
+                            audit.compare(near, &named(others), place);
+                        }
                     } else {
                         audit.fallbacks += 1;
                     }

@@ -16,7 +16,7 @@ use crate::dispersion::{Affine, Chain, Cursor, Dispersion, Draws, Sampler};
 use crate::dynamics::{DrawnVehicle, Effects, Model, Part, Plant};
 use crate::margins::Assessment;
 use crate::modal::identify::{self, Solved};
-use crate::modal::spectrum::{Base, Spectrum};
+use crate::modal::spectrum::{Base, Bounded, Spectrum};
 use crate::modal::{self, Reference, Solver, eigen};
 use crate::vehicle::Vehicle;
 use nalgebra::Complex;
@@ -125,6 +125,10 @@ pub(super) struct Buffers {
     spectrum: Spectrum,
     /// Proven bounds of the poles, rad/s; none where they were solved densely.
     bounds: Vec<f64>,
+    /// Number of poles of the model, conjugates included, whether all were asked for or not.
+    degree: usize,
+    /// Guesses of the poles of the modes of interest.
+    guesses: Vec<Complex<f64>>,
 }
 
 impl Buffers {
@@ -134,7 +138,15 @@ impl Buffers {
         let index = known.unwrap_or_else(|| {
             let (model, scratch) = (Model::zeros(size), Model::zeros(size));
             let (solver, spectrum) = (Solver::new(size), Spectrum::new());
-            all.push(Self { model, scratch, solver, spectrum, bounds: Vec::new() });
+            all.push(Self {
+                model,
+                scratch,
+                solver,
+                spectrum,
+                bounds: Vec::new(),
+                degree: 0,
+                guesses: Vec::new(),
+            });
             all.len() - 1
         });
         &mut all[index]
@@ -245,8 +257,7 @@ impl<'a> Evaluator<'a> {
                     let (rows, found) =
                         self.solve(at, &place, (variant, sensitive), buffers, poles)?;
                     solution = Some(found);
-                    let solved: usize = poles.iter().map(|s| if s.im > 0.0 { 2 } else { 1 }).sum();
-                    at_origin = buffers.model.states() - solved;
+                    at_origin = buffers.model.states() - buffers.degree;
                     Ok(rows)
                 });
                 let null_poles = buffers.model.null_states.len() + at_origin;
@@ -382,10 +393,11 @@ impl<'a> Evaluator<'a> {
             let place = self.place(at, variant, draws, &chain, vehicle);
             let buffers = Buffers::of(buffers, place.plant.layout.coordinates());
             place.plant.assemble(vehicle, place.effects, &mut buffers.model);
-            find_poles(at.variants[variant].base.as_ref(), buffers, poles)?;
+            find_poles(at.variants[variant].base.as_ref(), buffers, Sought::All, poles)?;
             let Buffers { model, scratch, solver, .. } = buffers;
             let mut solved = Solved::new(model, poles);
-            let found = self.identify(at, [variant, mode], &mut solved, solver, scratch)?;
+            let found = self.identify(at, [variant, mode], &mut solved, solver, scratch);
+            let found = found.map_err(|lost| self.lost(mode, lost))?;
             let row = |(branch, candidate): (Branch, modal::Candidate)| {
                 let label = &at.labels[mode];
                 let pole = named_pole(place.plant, mode, branch, label, &candidate)?;
@@ -407,12 +419,11 @@ impl<'a> Evaluator<'a> {
         solved: &mut Solved<'_>,
         solver: &mut Solver,
         scratch: &mut Model,
-    ) -> Result<Vec<(Branch, modal::Candidate)>, Failure> {
+    ) -> Result<Vec<(Branch, modal::Candidate)>, identify::Lost> {
         let AtVariant { nominal, references, .. } = &at.variants[variant];
         let ratio = self.definition.exchange_ratio;
         let identity =
-            identify::identify(solver, &references[mode], nominal, solved, ratio, scratch)
-                .map_err(|lost| self.lost(mode, lost))?;
+            identify::identify(solver, &references[mode], nominal, solved, ratio, scratch)?;
         let partner = identity.partner.map(|partner| (Branch::Partner, partner));
         Ok(std::iter::once((Branch::Primary, identity.primary)).chain(partner).collect())
     }
@@ -427,7 +438,8 @@ impl<'a> Evaluator<'a> {
         })
     }
 
-    /// Solves one variant of the drawn vehicle of `place`; its model stays in `buffers`.
+    /// Solves one variant of the drawn vehicle of `place`; its model stays in `buffers`, and in `poles` those found: of a
+    /// model with a full part only some, where nothing asks for all.
     fn solve(
         &self,
         at: &AtTime,
@@ -436,21 +448,52 @@ impl<'a> Evaluator<'a> {
         buffers: &mut Buffers,
         poles: &mut Vec<Complex<f64>>,
     ) -> Result<(Vec<Pole>, Solution), Failure> {
+        let AtVariant { references, base, loops, .. } = &at.variants[variant];
+        place.plant.assemble(place.drawn, place.effects, &mut buffers.model);
+        let Buffers { model, guesses, .. } = &mut *buffers;
+        guesses.clear();
+        guesses.extend(references.iter().map(|mode| mode.predict(model)));
+        let some = !self.all_poles && !sensitive && loops.is_none();
+        let sought = if some { Sought::Near } else { Sought::All };
+        let which = (variant, sensitive);
+        let solution = find_poles(base.as_ref(), buffers, sought, poles)?;
+        if let Some(rows) = self.rows(at, place, which, solution, buffers, poles)? {
+            return Ok((rows, solution));
+        }
+        let mut all = find_poles(base.as_ref(), buffers, Sought::All, poles)?;
+        all.determinants += solution.determinants;
+        let rows = self.rows(at, place, which, all, buffers, poles)?;
+        Ok((rows.expect("all poles are known"), all))
+    }
+
+    /// The rows of the poles found, with what is asked of them; none where the poles found are some, and others may carry a
+    /// mode.
+    fn rows(
+        &self,
+        at: &AtTime,
+        place: &Place<'_>,
+        (variant, sensitive): (usize, bool),
+        solution: Solution,
+        buffers: &mut Buffers,
+        poles: &[Complex<f64>],
+    ) -> Result<Option<Vec<Pole>>, Failure> {
         let plant = place.plant;
-        plant.assemble(place.drawn, place.effects, &mut buffers.model);
-        let solution = find_poles(at.variants[variant].base.as_ref(), buffers, poles)?;
-        let Buffers { model, scratch, solver, spectrum, bounds } = buffers;
-        let mut solved = Solved::new(model, poles);
+        let Buffers { model, scratch, solver, spectrum, bounds, guesses, .. } = buffers;
+        let mut solved = match solution.certificate {
+            Certificate::Near => Solved::in_part(model, poles),
+            _ => Solved::new(model, poles),
+        };
         let mut rows = Vec::new();
         let structured = solution.solver == definition::Solver::Structured;
-        for mode in 0..at.labels.len() {
+        for (mode, &guess) in guesses.iter().enumerate() {
             if structured {
-                let guess = at.variants[variant].references[mode].predict(model);
                 offer_near(guess, &mut solved, spectrum);
             }
-            for (branch, found) in
-                self.identify(at, [variant, mode], &mut solved, solver, scratch)?
-            {
+            let found = match self.identify(at, [variant, mode], &mut solved, solver, scratch) {
+                Err(identify::Lost::Beyond { .. }) => return Ok(None),
+                found => found.map_err(|lost| self.lost(mode, lost))?,
+            };
+            for (branch, found) in found {
                 let mut row = named_pole(plant, mode, branch, &at.labels[mode], &found)?;
                 if sensitive {
                     let near = neighbours(&solved, row.value);
@@ -464,7 +507,7 @@ impl<'a> Evaluator<'a> {
         if self.all_poles {
             let named: Vec<Complex<f64>> = rows.iter().map(|row: &Pole| row.value).collect();
             if structured {
-                offer(poles.clone(), &mut solved, spectrum);
+                offer(poles.to_vec(), &mut solved, spectrum);
             }
             for &pole in poles.iter().filter(|pole| !named.contains(pole)) {
                 rows.push(other_pole(plant, solved.reference(solver, pole)));
@@ -474,13 +517,13 @@ impl<'a> Evaluator<'a> {
             let proven = poles.iter().zip(&*bounds).find(|(pole, _)| **pole == row.value);
             row.error_bound = proven.map(|(_, bound)| *bound).or(row.error_bound);
         }
-        Ok((rows, solution))
+        Ok(Some(rows))
     }
 
     fn lost(&self, mode: usize, lost: identify::Lost) -> Failure {
         match lost {
             identify::Lost::Solve(error) => Failure::from(&error),
-            identify::Lost::Overlap { .. } => Failure::new(
+            identify::Lost::Overlap { .. } | identify::Lost::Beyond { .. } => Failure::new(
                 FailureKind::IdentityLost,
                 format!("mode {}: {lost}", self.definition.modes[mode]),
             ),
@@ -488,24 +531,42 @@ impl<'a> Evaluator<'a> {
     }
 }
 
-/// All poles of the model in `buffers`: by its base where there is one and they can be certified, else
-/// densely.
+/// Poles of a model with a full part that are found for each mode of interest at the least.
+const NEAR: usize = 4;
+
+/// Which poles are asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sought {
+    /// All.
+    All,
+    /// At least those near the guesses of the modes of interest.
+    Near,
+}
+
+/// The poles sought of the model in `buffers`: by its base where there is one and they can be certified, else all densely.
 pub(super) fn find_poles(
     base: Option<&Base>,
     buffers: &mut Buffers,
+    sought: Sought,
     poles: &mut Vec<Complex<f64>>,
 ) -> Result<Solution, Failure> {
-    let Buffers { model, solver, spectrum, bounds, .. } = buffers;
+    let Buffers { model, solver, spectrum, bounds, degree, guesses, .. } = buffers;
     bounds.clear();
-    let certified = base.map(|base| spectrum.solve(base, model));
+    let certified = base.map(|base| match sought {
+        Sought::Near => spectrum.solve_near(base, model, guesses, NEAR),
+        Sought::All => spectrum.solve(base, model),
+    });
     let determinants = base.map_or(0, |_| spectrum.evaluations());
     if let Some(Ok(certified)) = certified {
         poles.clear();
         poles.extend(certified.iter().map(|pole| pole.root));
         bounds.extend(certified.iter().map(|pole| pole.bound));
+        *degree = spectrum.degree();
+        let all = certified.iter().map(Bounded::conjugates).sum::<usize>() == *degree;
         let single = certified.iter().all(|pole| pole.multiplicity == 1);
         let certificate = match (spectrum.is_refined(), single) {
-            (true, _) => Certificate::Residual,
+            (true, _) if all => Certificate::Residual,
+            (true, _) => Certificate::Near,
             (false, true) => Certificate::Discs,
             (false, false) => Certificate::Clusters,
         };
@@ -513,6 +574,7 @@ pub(super) fn find_poles(
         return Ok(Solution { solver, certificate, determinants });
     }
     solver.poles(model, poles).map_err(|error| Failure::from(&error))?;
+    *degree = poles.iter().map(|s| if s.im > 0.0 { 2 } else { 1 }).sum();
     let (solver, certificate) = (definition::Solver::Dense, Certificate::Residual);
     Ok(Solution { solver, certificate, determinants })
 }

@@ -4,7 +4,7 @@
 //! What margins are is decided in `margins`; which variants have them by the run definition.
 
 use super::definition::{Definition, LoopPlan, Variant};
-use super::evaluator::{Buffers, find_poles};
+use super::evaluator::{Buffers, Sought, find_poles};
 use super::plant::{self, Extent};
 use super::{Failure, FailureKind};
 use crate::dynamics::servo::{self, Row};
@@ -111,7 +111,7 @@ impl OpenLoop {
         let (autopilot, law) = servo.autopilot().expect("an open loop has an autopilot");
         self.plant.assemble(drawn, &self.effects, &mut buffers.model);
         let mut poles = Vec::new();
-        find_poles(self.base.as_ref(), buffers, &mut poles)?;
+        find_poles(self.base.as_ref(), buffers, Sought::All, &mut poles)?;
         let Buffers { model, solver, .. } = buffers;
         // Axis commands are the first external inputs.
         let inputs = servo.inputs(&servo.compose(drawn), layout).columns(0, 3).into_owned();

@@ -162,11 +162,14 @@ pub enum Certificate {
     /// Residuals of the pairs, sums of poles against traces: of a dense solve; or of a structured one of a model with a full
     /// part, where the residuals' discs do not meet.
     Residual,
+    /// Residuals of the pairs near the modes of interest, whose discs do not meet, of a structured solve of a model with a full
+    /// part; all other poles are proven without it alone.
+    Near,
 }
 
 impl Certificate {
     /// Every certificate, in the order of declaration.
-    pub const ALL: [Self; 3] = [Self::Discs, Self::Clusters, Self::Residual];
+    pub const ALL: [Self; 4] = [Self::Discs, Self::Clusters, Self::Residual, Self::Near];
 
     /// The word in tables.
     pub fn name(self) -> &'static str {
@@ -174,6 +177,7 @@ impl Certificate {
             Self::Discs => "discs",
             Self::Clusters => "clusters",
             Self::Residual => "residual",
+            Self::Near => "near",
         }
     }
 }

@@ -379,7 +379,7 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
             "pole_error_bound_rad_s",
             "rad/s",
             "Bound of the distance of the pole from an exact one: by discs with rounding estimated, to first order from the \
-             residual where the certificate is residual; NULL if there is none",
+             residual where the certificate is residual or near; NULL if there is none",
             |p| p.error_bound,
         ),
         Column::word(
@@ -392,7 +392,8 @@ pub fn modes(outline: &Outline) -> Vec<Column<ModeRow>> {
             "certificate",
             "What proves the poles of the evaluation: discs, one pole in each; clusters, discs of which some \
              hold several poles; residual, residuals of the pairs and sums of poles against traces, of a dense solve or, \
-             structured with a full jet damping matrix, with discs of the residuals that do not meet",
+             structured with a full jet damping matrix, with discs of the residuals that do not meet; near, such residuals \
+             and discs of the poles near the modes of interest alone, where the others are not written",
             Certificate::ALL.map(Certificate::name),
             |r: &ModeRow| Some(r.solution?.certificate as usize),
         ),

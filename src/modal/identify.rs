@@ -26,6 +26,8 @@ pub struct Reference {
 pub struct Solved<'a> {
     model: &'a Model,
     poles: &'a [c64],
+    /// Whether these are all poles.
+    complete: bool,
     seen: Vec<Reference>,
     /// Right and left vectors known beforehand, `yᵀ L = 0`.
     known: Vec<(c64, [Vec<c64>; 2])>,
@@ -34,7 +36,12 @@ pub struct Solved<'a> {
 impl<'a> Solved<'a> {
     /// A model and all its poles.
     pub fn new(model: &'a Model, poles: &'a [c64]) -> Self {
-        Self { model, poles, seen: Vec::new(), known: Vec::new() }
+        Self { model, poles, complete: true, seen: Vec::new(), known: Vec::new() }
+    }
+
+    /// A model and some of its poles.
+    pub fn in_part(model: &'a Model, poles: &'a [c64]) -> Self {
+        Self { complete: false, ..Self::new(model, poles) }
     }
 
     /// The model.
@@ -42,7 +49,7 @@ impl<'a> Solved<'a> {
         self.model
     }
 
-    /// All poles.
+    /// Its poles, all or those known.
     pub fn poles(&self) -> &'a [c64] {
         self.poles
     }
@@ -111,6 +118,12 @@ pub enum Lost {
         best: f64,
         /// Least modulus allowed.
         least: f64,
+    },
+    /// The poles known do not account for the mode, and are not all.
+    #[error("the poles known account for all but {rest:.3} of it")]
+    Beyond {
+        /// Modulus of one less the sum of overlaps.
+        rest: f64,
     },
 }
 
@@ -231,16 +244,20 @@ impl Reference {
 ///
 /// Poles are tried from the nearest to the predicted one outwards until the overlaps account for
 /// all but a small rest.
+///
+/// # Errors
+/// [`Lost::Beyond`] where poles that are not known account for more.
 fn candidates(
     solver: &mut Solver,
     solved: &mut Solved<'_>,
     reference: &Reference,
-) -> Vec<Candidate> {
+) -> Result<Vec<Candidate>, Lost> {
     let guess = reference.predict(solved.model);
     let mut order: Vec<c64> = solved.poles.to_vec();
     order.sort_by(|a, b| (a - guess).norm_sqr().total_cmp(&(b - guess).norm_sqr()));
     let mut found: Vec<Candidate> = Vec::new();
     let mut rest = c64::new(1.0, 0.0);
+    let mut accounted = false;
     for pole in order {
         let other = solved.reference(solver, pole);
         let overlap = reference.overlap(other);
@@ -248,19 +265,23 @@ fn candidates(
         if overlap.norm().is_finite() {
             found.push(Candidate { reference: other.clone(), overlap });
         }
-        if found.len() >= 2 && rest.norm() <= UNACCOUNTED {
+        accounted = found.len() >= 2 && rest.norm() <= UNACCOUNTED;
+        if accounted {
             break;
         }
     }
+    if !(accounted || solved.complete) {
+        return Err(Lost::Beyond { rest: rest.norm() });
+    }
     found.sort_by(|a, b| b.overlap.norm().total_cmp(&a.overlap.norm()));
-    found
+    Ok(found)
 }
 
 /// Follows `reference` from one model to another along a path of models.
 ///
 /// `path(t)` fills a model for t in (0, 1]; a step is accepted when one pole keeps at least
 /// `STEP_OVERLAP`, else it is halved, down to `LEAST_STEP`, where the best is taken: a mode
-/// crosses others by its vectors, not by its frequency. `at_end` are the poles at t = 1, where they are known.
+/// crosses others by its vectors, not by its frequency. `at_end` has the poles at t = 1, where they are known.
 ///
 /// # Errors
 /// [`Lost`] where a solve fails or no pole overlaps.
@@ -268,7 +289,7 @@ pub fn follow(
     solver: &mut Solver,
     mut reference: Reference,
     model: &mut Model,
-    at_end: Option<&[c64]>,
+    at_end: Option<&Solved<'_>>,
     mut path: impl FnMut(f64, &mut Model),
 ) -> Result<Reference, Lost> {
     let (mut done, mut step) = (0.0_f64, 1.0_f64);
@@ -276,12 +297,14 @@ pub fn follow(
     while done < 1.0 {
         let next = (done + step).min(1.0);
         path(next, model);
-        match at_end.filter(|_| next == 1.0) {
-            Some(known) => known.clone_into(&mut poles),
-            None => solver.poles(model, &mut poles)?,
-        }
-        let mut solved = Solved::new(model, &poles);
-        let found = candidates(solver, &mut solved, &reference).into_iter().next();
+        let mut solved = match at_end.filter(|_| next == 1.0) {
+            Some(end) => Solved { complete: end.complete, ..Solved::new(model, end.poles) },
+            None => {
+                solver.poles(model, &mut poles)?;
+                Solved::new(model, &poles)
+            }
+        };
+        let found = candidates(solver, &mut solved, &reference)?.into_iter().next();
         let best = found.ok_or(Lost::Overlap { best: 0.0, least: LEAST_OVERLAP })?;
         let overlap = best.overlap.norm();
         if overlap >= STEP_OVERLAP || step <= LEAST_STEP {
@@ -305,7 +328,7 @@ pub fn follow(
 /// size of the models.
 ///
 /// # Errors
-/// [`Lost`] where no pole overlaps enough or a solve on the way fails.
+/// [`Lost`] where no pole overlaps enough, a solve on the way fails, or poles that are not known may carry the mode.
 pub fn identify(
     solver: &mut Solver,
     reference: &Reference,
@@ -314,7 +337,7 @@ pub fn identify(
     exchange_ratio: f64,
     scratch: &mut Model,
 ) -> Result<Identity, Lost> {
-    let mut found = candidates(solver, case, reference).into_iter();
+    let mut found = candidates(solver, case, reference)?.into_iter();
     let best = found.next().ok_or(Lost::Overlap { best: 0.0, least: LEAST_OVERLAP })?;
     let most = best.overlap.norm();
     if !(most >= LEAST_OVERLAP) {
@@ -326,7 +349,7 @@ pub fn identify(
     };
     let start = reference.clone();
     let blend = |t: f64, model: &mut Model| model.blend(nominal, case.model, t);
-    let end = follow(solver, start, scratch, Some(case.poles), blend)?;
+    let end = follow(solver, start, scratch, Some(case), blend)?;
     // The path ends in the case itself, so that its last pole is one of the case's, bit for bit.
     let at_end = |candidate: &Candidate| candidate.reference.pair.pole == end.pair.pole;
     if at_end(&best) {

@@ -46,6 +46,8 @@ pub struct Spectrum {
     /// Determinants of a round with their errors.
     values: Vec<(Scaled, f64)>,
     evaluations: usize,
+    /// Number of poles of the last model that was certified.
+    degree: usize,
     /// Poles of the last model with its full part and their vectors, group by group.
     groups: Vec<Refined>,
     /// Poles whose vectors alone are asked for.
@@ -99,6 +101,7 @@ impl Spectrum {
             guesses: Vec::new(),
             values: Vec::new(),
             evaluations: 0,
+            degree: 0,
             groups: Vec::new(),
             aside: Refined::default(),
             room: Room::default(),
@@ -121,12 +124,41 @@ impl Spectrum {
         8.0 / 3.0 * self.pencil.reduction().effort(model) * self.evaluations as f64
     }
 
+    /// Poles of the last model solved, conjugates included, found or not; without those at the origin that are known by
+    /// construction.
+    pub fn degree(&self) -> usize {
+        self.degree
+    }
+
     /// All poles of `model`, found from those of `base`: pairs by their member in the upper half plane, sorted by
     /// imaginary, then real part; without those at the origin that are known by construction.
     ///
     /// # Errors
     /// Why there is no certificate.
     pub fn solve(&mut self, base: &Base, model: &Model) -> Result<Vec<Bounded>, Uncertain> {
+        let found = self.solve_structure(base, model)?;
+        if self.is_refined() { self.refine(&found) } else { Ok(found) }
+    }
+
+    /// Like [`Spectrum::solve`], but of a model with a full part only poles near `guesses`: at least the `count` nearest
+    /// to each, filled up to whole groups of eight. Each is proven by its residual, and no two are the same; that there
+    /// are no others is proven of the model without its full part alone.
+    ///
+    /// # Errors
+    /// Why there is no certificate.
+    pub fn solve_near(
+        &mut self,
+        base: &Base,
+        model: &Model,
+        guesses: &[c64],
+        count: usize,
+    ) -> Result<Vec<Bounded>, Uncertain> {
+        let found = self.solve_structure(base, model)?;
+        if self.is_refined() { self.refine(&nearest(&found, guesses, count)) } else { Ok(found) }
+    }
+
+    /// All poles of `model` without its full part.
+    fn solve_structure(&mut self, base: &Base, model: &Model) -> Result<Vec<Bounded>, Uncertain> {
         self.evaluations = 0;
         if base.degree() != model.states() {
             return Err(Uncertain::Unresolved);
@@ -189,11 +221,12 @@ impl Spectrum {
             self.secular.renew();
         }
         let found = self.secular.certify(elsewhere)?;
-        if self.is_refined() { self.refine(&found) } else { Ok(found) }
+        self.degree = found.iter().map(Bounded::conjugates).sum();
+        Ok(found)
     }
 
-    /// The poles of the model with its full part, from those without it: each by its residual, and complete since their
-    /// discs do not meet and their sum is that of the first-order changes, which is that of all (a trace). Repeated poles
+    /// Poles of the model with its full part, sorted, from those `without` it: each by its residual, and their discs do not
+    /// meet. Where these are all, their sum is that of the first-order changes, which is that of all (a trace). Repeated poles
     /// stay as they are where the full part does not act on their vectors, of which those found are one that stands for
     /// all: that of a right-hand side of no order.
     fn refine(&mut self, without: &[Bounded]) -> Result<Vec<Bounded>, Uncertain> {
@@ -210,7 +243,7 @@ impl Spectrum {
                 if !(bound <= LARGEST_BOUND * root.norm()) {
                     return Err(Uncertain::Unresolved);
                 }
-                let times = if root.im == 0.0 { 1.0 } else { 2.0 };
+                let times = start.conjugates() as f64;
                 lacking += times * (root.re - start.root.re - shift.re[lane]);
                 let size = shift.re[lane].hypot(shift.im[lane]);
                 allowed += times * (bound + start.bound + TRACE * size);
@@ -233,7 +266,7 @@ impl Spectrum {
         for (index, a) in found.iter().enumerate() {
             let near = found[index + 1..].iter().enumerate();
             for (at, b) in near.take_while(|(_, b)| b.root.im - a.root.im <= a.bound + largest) {
-                if !((a.root - b.root).norm() > a.bound + b.bound) {
+                if a.meets(b) {
                     met[index] += 1;
                     met[index + 1 + at] += 1;
                 }
@@ -243,7 +276,8 @@ impl Spectrum {
         if !counted || found.iter().any(|a| a.root.im != 0.0 && !(a.root.im > a.bound)) {
             return Err(Uncertain::Unresolved);
         }
-        if lacking.abs() <= allowed { Ok(found) } else { Err(Uncertain::Contradicted) }
+        let all = without.iter().map(Bounded::conjugates).sum::<usize>() == self.degree;
+        if !all || lacking.abs() <= allowed { Ok(found) } else { Err(Uncertain::Contradicted) }
     }
 
     /// Right and left vectors of poles of `model`, the last one solved; none where it is not reduced.
@@ -283,6 +317,32 @@ impl Spectrum {
     pub fn is_refined(&self) -> bool {
         self.pencil.reduction().is_full()
     }
+}
+
+/// At least the `count` poles nearest to each guess, whole clusters, filled up to whole groups; in their order.
+fn nearest(poles: &[Bounded], guesses: &[c64], count: usize) -> Vec<Bounded> {
+    // The place of each in the distances from one of the guesses.
+    let mut ranks = vec![(usize::MAX, f64::INFINITY); poles.len()];
+    for guess in guesses {
+        let mut order: Vec<(f64, usize)> =
+            poles.iter().map(|pole| (pole.root - guess).norm()).zip(0..).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (rank, (distance, at)) in order.into_iter().enumerate() {
+            if rank < ranks[at].0 {
+                ranks[at] = (rank, distance);
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..poles.len()).collect();
+    order.sort_by(|a, b| ranks[*a].0.cmp(&ranks[*b].0).then(ranks[*a].1.total_cmp(&ranks[*b].1)));
+    let wanted = ranks.iter().filter(|(rank, _)| *rank < count).count();
+    order.truncate(wanted.next_multiple_of(WIDTH));
+    let chosen = |at: usize| {
+        let pole = &poles[at];
+        let mate = |other: &usize| pole.meets(&poles[*other]);
+        order.contains(&at) || pole.multiplicity > 1 && order.iter().any(mate)
+    };
+    (0..poles.len()).filter(|at| chosen(*at)).map(|at| poles[at]).collect()
 }
 
 #[cfg(test)]

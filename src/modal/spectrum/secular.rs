@@ -82,6 +82,18 @@ pub struct Bounded {
     pub multiplicity: usize,
 }
 
+impl Bounded {
+    /// One where it is real, two where it stands for a pair.
+    pub fn conjugates(&self) -> usize {
+        if self.root.im == 0.0 { 1 } else { 2 }
+    }
+
+    /// Whether both may be the same root.
+    pub fn meets(&self, other: &Self) -> bool {
+        !((self.root - other.root).norm() > self.bound + other.bound)
+    }
+}
+
 /// Why there is no certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Uncertain {
