@@ -663,10 +663,15 @@ impl Factors<'_> {
         for &j in listed {
             sum = sum.subtract_product(Complex::load(&row[j]), Complex::load(&x[j]));
         }
-        for (a, x) in row[dense.clone()].iter().zip(&x[dense]) {
-            sum = sum.subtract_product(Complex::load(a), Complex::load(x));
+        // Two sums, so that one need not wait for the other.
+        let mut other = Complex::<V>::splat(0.0, 0.0);
+        for (a, x) in row[dense.clone()].chunks(2).zip(x[dense].chunks(2)) {
+            sum = sum.subtract_product(Complex::load(&a[0]), Complex::load(&x[0]));
+            if a.len() > 1 {
+                other = other.subtract_product(Complex::load(&a[1]), Complex::load(&x[1]));
+            }
         }
-        sum
+        sum.add(other)
     }
 
     /// `x_j −= a_ij b` over some columns.

@@ -163,8 +163,8 @@ impl Gram {
         let mut shared = V::splat(0.0);
         let modes = self.weights.len();
         for first in (0..modes).step_by(BLOCK) {
-            let right = self.forces_on::<V>(first, right);
-            let left = self.forces_on::<V>(first, left);
+            let right = self.forces_on::<V, BLOCK>(first, right);
+            let left = self.forces_on::<V, BLOCK>(first, left);
             for i in 0..BLOCK.min(modes - first) {
                 let mode = first + i;
                 // |bᵀf/e| of both.
@@ -181,23 +181,21 @@ impl Gram {
     /// The forces `bᵀ f` on a block of elastic coordinates, b their rows of motions and f forces on these; beyond the last
     /// coordinate those on it.
     #[inline(always)]
-    pub fn forces_on<V: Vector>(&self, first: usize, forces: &[Complexes]) -> [Complex<V>; BLOCK] {
+    pub fn forces_on<V: Vector, const N: usize>(
+        &self,
+        first: usize,
+        forces: &[Complexes],
+    ) -> [Complex<V>; N] {
         let Self { motions, stride, .. } = self;
         let (count, last) = (forces.len(), self.weights.len() - 1);
-        let mut starts = [0; BLOCK];
-        for i in 0..BLOCK {
-            starts[i] = (first + i).min(last) * stride;
+        let mut rows = [&motions[..count]; N];
+        for i in 0..N {
+            rows[i] = &motions[(first + i).min(last) * stride..][..count];
         }
-        let rows = [
-            &motions[starts[0]..][..count],
-            &motions[starts[1]..][..count],
-            &motions[starts[2]..][..count],
-            &motions[starts[3]..][..count],
-        ];
-        let mut sums = [Complex::<V>::splat(0.0, 0.0); BLOCK];
+        let mut sums = [Complex::<V>::splat(0.0, 0.0); N];
         for at in 0..count {
             let force = Complex::<V>::load(&forces[at]);
-            for i in 0..BLOCK {
+            for i in 0..N {
                 sums[i] = sums[i].add_real_product(V::splat(rows[i][at]), force);
             }
         }

@@ -18,6 +18,9 @@ use super::scaled::{Product, Scaled};
 use crate::dynamics::Model;
 use faer::c64;
 
+/// Rows that are summed at once.
+const ROWS: usize = 8;
+
 /// A polynomial with the poles of a model as its roots.
 pub struct Pencil {
     /// Coordinates of the matrix: others, then motions.
@@ -43,8 +46,8 @@ pub struct Pencil {
     first: Vec<usize>,
     rows: Vec<usize>,
     values: Vec<Complexes>,
-    /// Places of all entries that are not zero, of a reduced model.
-    occupied: Vec<[usize; 2]>,
+    /// Places of all entries that are not zero, of a reduced model: row by row, and column by column.
+    occupied: [Vec<[usize; 2]>; 2],
     /// Forces on motions in the null vectors.
     forces: [Vec<Complexes>; 2],
     /// Scales of rows and columns at the typical modulus.
@@ -75,7 +78,7 @@ impl Pencil {
             first: Vec::new(),
             rows: Vec::new(),
             values: Vec::new(),
-            occupied: Vec::new(),
+            occupied: [Vec::new(), Vec::new()],
             forces: [Vec::new(), Vec::new()],
             scale: [Vec::new(), Vec::new()],
             lanes: [Vec::new(), Vec::new()],
@@ -222,9 +225,13 @@ impl Pencil {
         }
         self.first.push(self.rows.len());
         self.values.resize(self.rows.len(), Complexes::ZERO);
-        let places = (0..size).flat_map(|i| (0..size).map(move |j| [i, j]));
-        self.occupied.clear();
-        self.occupied.extend(places.filter(|[i, j]| self.entries[i * size + j] != [0.0; 3]));
+        let places = || (0..size).flat_map(|i| (0..size).map(move |j| [i, j]));
+        let nonzero = |[i, j]: &[usize; 2]| self.entries[i * size + j] != [0.0; 3];
+        let [rows, columns] = &mut self.occupied;
+        rows.clear();
+        rows.extend(places().filter(nonzero));
+        columns.clear();
+        columns.extend(places().map(|[j, i]| [i, j]).filter(nonzero));
         for forces in &mut self.forces {
             forces.resize(self.reduction.count, Complexes::ZERO);
         }
@@ -450,8 +457,8 @@ impl Pencil {
         let minus = V::splat(-1.0);
         let modes = self.reduction.own.len();
         for first in (0..modes).step_by(BLOCK) {
-            let from_right = self.gram.forces_on::<V>(first, &self.forces[0]);
-            let from_left = self.gram.forces_on::<V>(first, &self.forces[1]);
+            let from_right = self.gram.forces_on::<V, BLOCK>(first, &self.forces[0]);
+            let from_left = self.gram.forces_on::<V, BLOCK>(first, &self.forces[1]);
             for i in 0..BLOCK.min(modes - first) {
                 let (mode, place) = (first + i, others + first + i);
                 let weight = self.gram.weight::<V>(mode);
@@ -465,77 +472,87 @@ impl Pencil {
     #[inline(always)]
     fn see<V: Vector>(&self, elastic: &[Complexes], weighted: bool, motions: &mut [Complexes]) {
         let stride = self.reduction.stride;
-        for first in (0..motions.len()).step_by(BLOCK) {
-            let mut sums = [Complex::<V>::splat(0.0, 0.0); BLOCK];
-            let rows = self.reduction.motions.chunks_exact(stride);
-            for (mode, row) in rows.enumerate() {
-                let mut value = Complex::<V>::load(&elastic[mode]);
-                if weighted {
-                    value = value.mul(self.gram.weight::<V>(mode));
-                }
-                let row = &row[first..first + BLOCK];
-                for i in 0..BLOCK {
-                    sums[i] = sums[i].add_real_product(V::splat(row[i]), value);
-                }
-            }
-            for i in 0..BLOCK.min(motions.len() - first) {
-                sums[i].store(&mut motions[first + i]);
-            }
+        let mut first = 0;
+        while first + ROWS <= stride {
+            self.see_some::<V, ROWS>(first, elastic, weighted, motions);
+            first += ROWS;
+        }
+        if first < motions.len() {
+            self.see_some::<V, BLOCK>(first, elastic, weighted, motions);
         }
     }
 
-    /// Matrices with these powers for s², s and 1, times a vector; each with its factors of the full damping and
-    /// stiffness, transposed all or none.
     #[inline(always)]
-    pub fn apply<V: Vector, const N: usize>(
+    fn see_some<V: Vector, const N: usize>(
         &self,
-        at: [&Frequencies<V>; N],
-        full: Option<[[Complex<V>; 2]; N]>,
+        first: usize,
+        elastic: &[Complexes],
+        weighted: bool,
+        motions: &mut [Complexes],
+    ) {
+        let mut sums = [Complex::<V>::splat(0.0, 0.0); N];
+        let rows = self.reduction.motions.chunks_exact(self.reduction.stride);
+        for (mode, row) in rows.enumerate() {
+            let mut value = Complex::<V>::load(&elastic[mode]);
+            if weighted {
+                value = value.mul(self.gram.weight::<V>(mode));
+            }
+            let row = &row[first..first + N];
+            for i in 0..N {
+                sums[i] = sums[i].add_real_product(V::splat(row[i]), value);
+            }
+        }
+        for i in 0..N.min(motions.len() - first) {
+            sums[i].store(&mut motions[first + i]);
+        }
+    }
+
+    /// The matrix with these powers for s², s and 1, with factors of its full damping and stiffness, or its transpose, times
+    /// a vector.
+    #[inline(always)]
+    pub fn apply<V: Vector>(
+        &self,
+        at: &Frequencies<V>,
+        full: Option<[Complex<V>; 2]>,
         transposed: bool,
         x: &[Complexes],
         core: &mut [Complexes],
-        mut to: [&mut [Complexes]; N],
+        to: &mut [Complexes],
     ) {
         let others = self.order.len();
         let elastic = &x[others..];
         self.see::<V>(elastic, false, &mut core[others..]);
         core[..others].copy_from_slice(&x[..others]);
-        // Sums over others gather in `to`, forces on motions beside.
-        let mut forces = [[Complexes::ZERO; MOST_MOTIONS]; N];
-        for n in 0..N {
-            to[n][..others].fill(Complexes::ZERO);
-        }
-        for &[row, column] in &self.occupied {
-            let entry = self.entries[row * self.size + column];
-            let (from, into) = if transposed { (row, column) } else { (column, row) };
-            let x = Complex::<V>::load(&core[from]);
-            for n in 0..N {
-                let value = value::<V>(entry, at[n].powers[0][self.degree[column]]);
-                let sum = match into < others {
-                    true => &mut to[n][into],
-                    false => &mut forces[n][into - others],
-                };
-                Complex::<V>::load(sum).add_product(value, x).store(sum);
+        to[..others].fill(Complexes::ZERO);
+        let mut forces = [Complexes::ZERO; MOST_MOTIONS];
+        // Row by row, transposed column by column.
+        let line_of = usize::from(transposed);
+        for places in self.occupied[line_of].chunk_by(|a, b| a[line_of] == b[line_of]) {
+            let mut sum = Complex::<V>::splat(0.0, 0.0);
+            for &[row, column] in places {
+                let entry = self.entries[row * self.size + column];
+                let x = Complex::<V>::load(&core[if transposed { row } else { column }]);
+                sum = sum.add_product(value::<V>(entry, at.powers[0][self.degree[column]]), x);
+            }
+            let line = places[0][line_of];
+            match line.checked_sub(others) {
+                Some(motion) => sum.store(&mut forces[motion]),
+                None => sum.store(&mut to[line]),
             }
         }
         let Reduction { count, own, .. } = &self.reduction;
-        for first in (0..own.len()).step_by(BLOCK) {
-            for n in 0..N {
-                let sums = self.gram.forces_on::<V>(first, &forces[n][..*count]);
-                for i in 0..BLOCK.min(own.len() - first) {
-                    let mode = first + i;
-                    let own = value::<V>(own[mode], at[n].powers[0][0]);
-                    let sum = sums[i].add_product(own, Complex::load(&elastic[mode]));
-                    sum.store(&mut to[n][others + mode]);
-                }
+        for first in (0..own.len()).step_by(ROWS) {
+            let sums = self.gram.forces_on::<V, ROWS>(first, &forces[..*count]);
+            for i in 0..ROWS.min(own.len() - first) {
+                let mode = first + i;
+                let own = value::<V>(own[mode], at.powers[0][0]);
+                let sum = sums[i].add_product(own, Complex::load(&elastic[mode]));
+                sum.store(&mut to[others + mode]);
             }
         }
         let Some(factors) = full else { return };
-        for kind in 0..2 {
-            let matrix = &self.reduction.full[kind][usize::from(transposed)];
-            if !matrix.is_empty() {
-                add_product::<V, N>(matrix, kind, &factors, elastic, &mut to, others);
-            }
+        for (matrices, factor) in self.reduction.full.iter().zip(factors) {
+            add_product::<V>(&matrices[line_of], factor, elastic, &mut to[others..]);
         }
     }
 
@@ -604,9 +621,9 @@ impl Pencil {
     #[inline(always)]
     fn substitute<V: Vector>(&self, forces: &[Complexes], sign: V, r: &mut [Complexes]) {
         let modes = self.reduction.own.len();
-        for first in (0..modes).step_by(BLOCK) {
-            let forces = self.gram.forces_on::<V>(first, forces);
-            for i in 0..BLOCK.min(modes - first) {
+        for first in (0..modes).step_by(ROWS) {
+            let forces = self.gram.forces_on::<V, ROWS>(first, forces);
+            for i in 0..ROWS.min(modes - first) {
                 let r = &mut r[first + i];
                 let sum = Complex::<V>::load(r).add_real_product(sign, forces[i]);
                 sum.mul(self.gram.weight::<V>(first + i)).store(r);
@@ -622,7 +639,7 @@ impl Pencil {
         right: &[Complexes],
         left: &[Complexes],
         residual: &[Complexes],
-    ) -> (Complex<V>, V) {
+    ) -> (V, V) {
         let others = self.order.len();
         let modes = self.reduction.own.len() as f64;
         let (mut first, mut size) = (V::splat(0.0), V::splat(0.0));
@@ -640,46 +657,36 @@ impl Pencil {
         // Own terms, the forces that balance them, and sums over motions and the full part.
         let left_out = self.reduction.left_out / (0.5 * f64::EPSILON);
         let rounding = size.mul(V::splat(16.0 + 4.0 * modes.sqrt() + left_out));
-        (Complex { re: first, im: V::splat(0.0) }, rounding)
+        (first, rounding)
     }
 }
 
-/// `to += factor · matrix · x` from place `start` on, with a real square matrix, row by row.
+/// `to += factor · matrix · x` with a real square matrix, row by row, or none.
 #[inline(always)]
-fn add_product<V: Vector, const N: usize>(
+fn add_product<V: Vector>(
     matrix: &[f64],
-    kind: usize,
-    factors: &[[Complex<V>; 2]; N],
+    factor: Complex<V>,
     x: &[Complexes],
-    to: &mut [&mut [Complexes]; N],
-    start: usize,
+    to: &mut [Complexes],
 ) {
     let count = x.len();
-    for first in (0..count).step_by(BLOCK) {
-        let rows = (count - first).min(BLOCK);
-        let mut sums = [Complex::<V>::splat(0.0, 0.0); BLOCK];
+    for first in (0..matrix.len() / count).step_by(ROWS) {
+        let rows = (count - first).min(ROWS);
+        let mut sums = [Complex::<V>::splat(0.0, 0.0); ROWS];
         // The last block takes the last row again and again.
-        let mut starts = [0; BLOCK];
-        for i in 0..BLOCK {
-            starts[i] = (first + i.min(rows - 1)) * count;
+        let mut lines = [&matrix[..count]; ROWS];
+        for i in 0..ROWS {
+            lines[i] = &matrix[(first + i.min(rows - 1)) * count..][..count];
         }
-        let lines = [
-            &matrix[starts[0]..starts[0] + count],
-            &matrix[starts[1]..starts[1] + count],
-            &matrix[starts[2]..starts[2] + count],
-            &matrix[starts[3]..starts[3] + count],
-        ];
         for column in 0..count {
             let value = Complex::<V>::load(&x[column]);
-            for i in 0..BLOCK {
+            for i in 0..ROWS {
                 sums[i] = sums[i].add_real_product(V::splat(lines[i][column]), value);
             }
         }
         for i in 0..rows {
-            for n in 0..N {
-                let to = &mut to[n][start + first + i];
-                Complex::<V>::load(to).add(sums[i].mul(factors[n][kind])).store(to);
-            }
+            let to = &mut to[first + i];
+            Complex::<V>::load(to).add_product(sums[i], factor).store(to);
         }
     }
 }

@@ -12,7 +12,7 @@ use faer::c64;
 /// Steps before a pole is given up.
 const MOST_STEPS: usize = 12;
 /// Distance of the point of the factors from the pole of L₀, relative.
-const ASIDE: f64 = 1e-9;
+const ASIDE: f64 = 1e-12;
 /// Relative bound of a pole that is good enough.
 const RESTED: f64 = 2e-11;
 /// What the bound leaves for what is not of first order.
@@ -40,7 +40,6 @@ pub struct Room {
     own: [Vec<Complexes>; 2],
     slopes: [Vec<Complexes>; 2],
     residual: Vec<Complexes>,
-    slope: Vec<Complexes>,
     core: [Vec<Complexes>; 2],
 }
 
@@ -48,8 +47,8 @@ impl Refined {
     /// Finds the poles near `starts`, those of the model without its full part.
     pub fn find(&mut self, level: Level, pencil: &mut Pencil, room: &mut Room, starts: &Complexes) {
         let size = pencil.places();
-        let Room { own, slopes, residual, slope, core } = room;
-        let vectors = [&mut self.right, &mut self.left, residual, slope];
+        let Room { own, slopes, residual, core } = room;
+        let vectors = [&mut self.right, &mut self.left, residual];
         for vector in vectors.into_iter().chain(own).chain(slopes) {
             vector.resize(size, Complexes::ZERO);
         }
@@ -86,6 +85,20 @@ fn subtract<V: Vector>(to: &mut [Complexes], factor: Complex<V>, vector: &[Compl
     }
 }
 
+/// `to −= change − along · own`.
+#[inline(always)]
+fn correct<V: Vector>(
+    to: &mut [Complexes],
+    change: &[Complexes],
+    along: Complex<V>,
+    own: &[Complexes],
+) {
+    for (to, (change, own)) in to.iter_mut().zip(change.iter().zip(own)) {
+        let change = Complex::<V>::load(change).subtract_product(along, Complex::load(own));
+        Complex::<V>::load(to).sub(change).store(to);
+    }
+}
+
 #[inline(always)]
 fn scale<V: Vector>(vector: &mut [Complexes], factor: Complex<V>) {
     for value in vector {
@@ -111,7 +124,7 @@ impl Kernel for Find<'_> {
     fn run<V: Vector>(self) {
         let Self { to, room, pencil, starts } = self;
         let Refined { poles, bound, shift, right, left } = to;
-        let Room { own, slopes, residual, slope, core } = room;
+        let Room { own, slopes, residual, core } = room;
         let start = Complex::<V>::load(starts);
         let mut aside = Complexes::ZERO;
         start.scale(V::splat(1.0 + ASIDE)).store(&mut aside);
@@ -119,22 +132,13 @@ impl Kernel for Find<'_> {
         let at_factors = Frequencies::<V>::new(&aside, 1.0);
         let [v, w] = own;
         pencil.null_vectors::<V>(v, w);
-        // Once more by the same factors, of L₀' v and w: then other vectors come in by their distance no more.
         let derivative = Frequencies::<V>::slope(start);
         normalise::<V>(v);
-        pencil.apply::<V, 1>([&derivative], None, false, v, &mut core[0], [&mut slopes[0]]);
         normalise::<V>(w);
-        pencil.apply::<V, 1>([&derivative], None, true, w, &mut core[0], [&mut slopes[1]]);
-        v.copy_from_slice(&slopes[0]);
-        pencil.solve::<V>(v, core);
-        w.copy_from_slice(&slopes[1]);
-        pencil.solve_transposed::<V>(&at_factors, w, core);
-        normalise::<V>(v);
-        normalise::<V>(w);
-        pencil.apply::<V, 1>([&derivative], None, false, v, &mut core[0], [&mut slopes[0]]);
+        pencil.apply::<V>(&derivative, None, false, v, &mut core[0], &mut slopes[0]);
         let unit = dot::<V>(w, &slopes[0]).reciprocal();
         scale::<V>(w, unit);
-        pencil.apply::<V, 1>([&derivative], None, true, w, &mut core[0], [&mut slopes[1]]);
+        pencil.apply::<V>(&derivative, None, true, w, &mut core[0], &mut slopes[1]);
         right.copy_from_slice(v);
         left.copy_from_slice(w);
         let mut s = start;
@@ -143,24 +147,19 @@ impl Kernel for Find<'_> {
         for step in 0..MOST_STEPS {
             s.store(poles);
             let at = Frequencies::<V>::new(poles, 1.0);
-            let derivative = Frequencies::<V>::slope(s);
-            let ones = Complex::<V>::splat(1.0, 0.0);
-            let zeros = Complex::<V>::splat(0.0, 0.0);
-            let full = Some([[s, ones], [ones, zeros]]);
-            let to = [&mut residual[..], &mut slope[..]];
-            pencil.apply::<V, 2>([&at, &derivative], full, false, right, &mut core[0], to);
-            let over = dot::<V>(left, slope).reciprocal();
-            let change = dot::<V>(left, residual).mul(over);
+            let full = Some([s, Complex::splat(1.0, 0.0)]);
+            pencil.apply::<V>(&at, full, false, right, &mut core[0], residual);
+            // Over wᵀ L₀' v, which is one, from which yᵀ L' x differs by what is left out of x and y.
+            let change = dot::<V>(left, residual);
             s = s.sub(change);
             if step == 0 {
-                zeros.sub(dot::<V>(left, residual)).store(shift);
+                Complex::<V>::splat(0.0, 0.0).sub(change).store(shift);
             }
             // The residual at the new s, to first order in its change.
-            subtract::<V>(residual, change, slope);
+            subtract::<V>(residual, change, &slopes[0]);
             let (first, rounding) = pencil.uncertainty::<V>(&at, right, left, residual);
-            let doubt = rounding.mul_add(V::splat(0.5 * f64::EPSILON), first.square().sqrt());
-            let size = change.square().sqrt();
-            let doubt = doubt.mul(over.square().sqrt()).add(size).mul(V::splat(SAFETY));
+            let doubt = rounding.mul_add(V::splat(0.5 * f64::EPSILON), first);
+            let doubt = doubt.add(change.square().sqrt()).mul(V::splat(SAFETY));
             let (mut moduli, mut before) = ([0.0; WIDTH], [0.0; WIDTH]);
             s.square().sqrt().store(&mut moduli);
             doubt.store(bound);
@@ -176,16 +175,14 @@ impl Kernel for Find<'_> {
             subtract::<V>(residual, along, &slopes[0]);
             pencil.solve::<V>(residual, core);
             let along = dot::<V>(&slopes[1], residual);
-            subtract::<V>(residual, along, v);
-            subtract::<V>(right, ones, residual);
-            let full = Some([[s, ones]]);
-            pencil.apply::<V, 1>([&at], full, true, left, &mut core[0], [residual]);
+            correct::<V>(right, residual, along, v);
+            let full = Some([s, Complex::splat(1.0, 0.0)]);
+            pencil.apply::<V>(&at, full, true, left, &mut core[0], residual);
             let along = dot::<V>(v, residual);
             subtract::<V>(residual, along, &slopes[1]);
             pencil.solve_transposed::<V>(&at_factors, residual, core);
             let along = dot::<V>(&slopes[0], residual);
-            subtract::<V>(residual, along, w);
-            subtract::<V>(left, ones, residual);
+            correct::<V>(left, residual, along, w);
             if done {
                 break;
             }
