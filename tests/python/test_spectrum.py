@@ -163,6 +163,22 @@ def test_repeated_poles_stay_what_they_are_under_the_full_jet_matrix(many):
     assert proven["jet_damping"] == ["residual"]
 
 
+def test_poles_near_the_modes_of_interest_are_those_of_all(many):
+    out = tvse("run", many / "run.toml", "--audit", 3, "--output", many / "near")
+    assert ": agreed" in out
+    near = pd.read_parquet(many / "near/tables/modes.parquet")
+    proven = near.groupby("variant")["certificate"].unique().map(list).to_dict()
+    assert proven == {"no_jet_damping": ["discs"], "jet_damping": ["near"]}
+    key = ["population", "case", "variant", "mode", "branch"]
+    every = pd.read_parquet(many / "run/tables/modes.parquet").dropna(subset="mode")
+    both = near.merge(every, on=key, suffixes=("", "_all"), validate="1:1")
+    assert len(both) == len(near) and (both["null_poles"] == both["null_poles_all"]).all()
+    off = np.hypot(both["pole_re_rad_s"] - both["pole_re_rad_s_all"], both["pole_im_rad_s"] - both["pole_im_rad_s_all"])
+    assert (off <= both["pole_error_bound_rad_s"] + both["pole_error_bound_rad_s_all"]).all()
+    assert (both["identity_confidence"] - both["identity_confidence_all"]).abs().max() < 1e-9
+    assert "bit for bit as stored" in tvse("replay", many / "near", "--case", 5)
+
+
 def test_many_modes_give_the_same_bytes_for_any_number_of_threads(many):
     for jobs in (1, 2):
         tvse("run", many / "run.toml", "--jobs", jobs, "--output", many / f"jobs{jobs}")

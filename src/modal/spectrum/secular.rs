@@ -326,7 +326,7 @@ impl Secular {
                     }
                     let step = modulus(step) / modulus(root);
                     let before = std::mem::replace(&mut steps[index], step);
-                    if !(step <= RESTED || step * (step / before) <= SETTLED) {
+                    if !(step <= RESTED || step * (step / before).powi(2) <= SETTLED) {
                         moving[left] = index;
                         left += 1;
                     }

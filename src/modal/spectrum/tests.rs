@@ -435,6 +435,40 @@ fn a_full_damping_matrix_is_added_with_residual_bounds_and_the_trace() {
 
 #[test]
 #[cfg_attr(miri, ignore = "hours under Miri")]
+fn poles_sought_near_guesses_are_those_of_all() {
+    let nominal = base(&attached(60, 0.0, true));
+    let case = attached(60, 0.2, true);
+    let mut spectrum = Spectrum::new();
+    let all = spectrum.solve(&nominal, &case).expect("certified");
+    let degree = spectrum.degree();
+    assert_eq!(degree, all.iter().map(Bounded::conjugates).sum::<usize>());
+    for guesses in [&[all[5].root][..], &[all[5].root, all[6].root, all[40].root]] {
+        let near = spectrum.solve_near(&nominal, &case, guesses, 3).expect("certified");
+        assert_eq!(spectrum.degree(), degree);
+        // Whole groups, of which the nearest are three for each guess.
+        assert_eq!(near.len(), 8);
+        for guess in guesses {
+            let mut order = all.clone();
+            let distance = |pole: &Bounded| (pole.root - guess).norm();
+            order.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+            for pole in &order[..3] {
+                assert!(near.iter().any(|other| other.meets(pole)), "{pole:?}");
+            }
+        }
+        assert!(near.iter().all(|pole| all.iter().filter(|a| a.meets(pole)).count() == 1));
+        let poles: Vec<c64> = near.iter().map(|pole| pole.root).collect();
+        assert_eq!(spectrum.vectors(&case, &poles).len(), 8);
+    }
+    let guesses: Vec<c64> = all.iter().map(|pole| pole.root).collect();
+    assert_eq!(spectrum.solve_near(&nominal, &case, &guesses, 1).as_ref(), Ok(&all));
+    // Without a full part all are found.
+    let (nominal, case) = (base(&attached(60, 0.0, false)), attached(60, 0.2, false));
+    let near = spectrum.solve_near(&nominal, &case, &guesses[..1], 1).expect("certified");
+    check(&near, &case);
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "hours under Miri")]
 fn vectors_of_the_reduced_form_are_those_of_the_whole_matrix() {
     for full in [false, true] {
         let nominal = base(&attached(60, 0.0, full));
@@ -473,6 +507,15 @@ fn a_full_part_as_strong_as_the_distance_of_poles_is_not_certified_wrongly() {
         let nominal = base(&case);
         if let Ok(found) = Spectrum::new().solve(&nominal, &case) {
             check(&found, &case);
+        }
+        let mut exact = Vec::new();
+        Solver::new(63).poles(&case, &mut exact).expect("solved");
+        let guesses: Vec<c64> = exact.iter().step_by(7).copied().collect();
+        if let Ok(found) = Spectrum::new().solve_near(&nominal, &case, &guesses, 2) {
+            for pole in found {
+                let off = exact.iter().map(|s| (s - pole.root).norm()).fold(f64::MAX, f64::min);
+                assert!(off <= pole.bound + 1e-11 * pole.root.norm(), "{pole:?} {off:.1e}");
+            }
         }
     }
 }
