@@ -9,8 +9,10 @@ use super::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
 use super::pencil::{Frequencies, Pencil};
 use faer::c64;
 
-/// Steps before a pole is given up.
-const MOST_STEPS: usize = 12;
+/// What is left of a bound after a step that no longer makes it better.
+const STILL: f64 = 0.8;
+/// Steps before a pole is given up: where two are as near as they are coupled each leaves half of what was.
+const MOST_STEPS: usize = 40;
 /// Distance of the point of the factors from the pole of L₀, relative.
 const ASIDE: f64 = 1e-12;
 /// Relative bound of a pole that is good enough.
@@ -166,7 +168,7 @@ impl Kernel for Find<'_> {
             last.store(&mut before);
             for lane in 0..WIDTH {
                 // Known well enough, or no better than before.
-                let still = step > 1 && !(bound[lane] < 0.5 * before[lane]);
+                let still = step > 1 && !(bound[lane] < STILL * before[lane]);
                 rested[lane] |= step > 0 && (bound[lane] <= RESTED * moduli[lane] || still);
             }
             last = doubt;
