@@ -26,6 +26,10 @@ const ADRIFT: f64 = 1e-4;
 const LOST: f64 = 0.05;
 /// Relative distance below which guesses are moved apart.
 const APART: f64 = 1e-4;
+/// Relative distance below which guesses are taken for those of one repeated pole, and the one to which these are moved:
+/// the determinant loses digits so near to it, but of this distance.
+const REPEATED: f64 = 1e-10;
+const BESIDE: f64 = 1e-11;
 /// Relative distance of roots that may be one repeated root; they become nodes in every round, which draws
 /// nearer to it each time.
 const CROWDED: f64 = 1e-3;
@@ -132,7 +136,7 @@ impl Secular {
         self.offset.resize(degree, zero);
         self.radius.clear();
         self.radius.resize(self.roots.len(), f64::INFINITY);
-        self.part(APART);
+        self.part();
         self.pending.clear();
         self.pending.extend(0..self.roots.len());
         self.renew();
@@ -151,8 +155,8 @@ impl Secular {
         order
     }
 
-    /// Moves guesses apart that are nearer than `least` of their modulus.
-    fn part(&mut self, least: f64) {
+    /// Moves guesses apart that are too near.
+    fn part(&mut self) {
         let order = self.sorted();
         for (position, &(index, _)) in order.iter().enumerate() {
             let root = self.roots[index];
@@ -163,8 +167,9 @@ impl Secular {
                     continue;
                 }
                 let (a, b) = (self.at(root.own), self.at(other.own));
-                let distance = least * modulus(a).max(modulus(b));
-                if modulus(a - b) < distance {
+                let (apart, size) = (modulus(a - b), modulus(a).max(modulus(b)));
+                let distance = size * if apart <= REPEATED * size { BESIDE } else { APART };
+                if apart < distance {
                     let pair = other.partner.is_some();
                     let step = if pair { c64::new(0.0, distance) } else { distance.into() };
                     self.offset[other.own] += step * 1.5;
