@@ -7,8 +7,8 @@
     reason = "closures and iterators do not inline into kernels of an instruction set"
 )]
 
-use super::lanes::{Complex, Complexes, Vector, WIDTH};
-use super::reduction::{BLOCK, Reduction};
+use super::lanes::{Complex, Complexes, Kernel, Level, Vector, WIDTH};
+use super::reduction::{BLOCK, MOST_MOTIONS, Reduction};
 use super::scaled::Product;
 
 /// Elements of G that are summed at once: as many as registers hold, real and imaginary parts.
@@ -41,7 +41,7 @@ pub struct Gram {
 
 impl Gram {
     /// Makes room for the motions and elastic coordinates of a model.
-    pub fn resize(&mut self, reduction: &Reduction) {
+    pub fn resize(&mut self, level: Level, reduction: &Reduction) {
         let (modes, stride) = (reduction.own.len(), reduction.stride);
         self.stride = stride;
         self.weights.resize(modes, Complexes::ZERO);
@@ -51,28 +51,21 @@ impl Gram {
         self.sizes.resize(stride, [0.0; WIDTH]);
         if self.motions != reduction.motions || self.pairs.last() != Some(&[reduction.count - 1; 2])
         {
-            self.multiply(reduction);
+            self.multiply(level, reduction);
         }
     }
 
     /// Products of motions.
-    fn multiply(&mut self, reduction: &Reduction) {
+    fn multiply(&mut self, level: Level, reduction: &Reduction) {
         self.motions.clone_from(&reduction.motions);
         self.pairs.clear();
         let count = reduction.count;
         self.pairs.extend((0..count).flat_map(|row| (row..count).map(move |column| [row, column])));
         self.squares.clear();
         self.squares.extend(self.motions.iter().map(|motion| motion * motion));
-        self.products.clear();
-        for pairs in self.pairs.chunks(PAIRS) {
-            for row in self.motions.chunks_exact(self.stride) {
-                let mut products = [0.0; PAIRS];
-                for (product, &[i, j]) in products.iter_mut().zip(pairs) {
-                    *product = row[i] * row[j];
-                }
-                self.products.push(products);
-            }
-        }
+        let blocks = self.pairs.len().div_ceil(PAIRS);
+        self.products.resize(blocks * reduction.own.len(), [0.0; PAIRS]);
+        level.run(Products { gram: self, count });
     }
 
     /// Forms G at frequencies with these powers s², s and 1 and their moduli; the product of all e.
@@ -200,5 +193,43 @@ impl Gram {
             }
         }
         sums
+    }
+}
+
+/// Products of the motions on each elastic coordinate.
+struct Products<'a> {
+    gram: &'a mut Gram,
+    count: usize,
+}
+
+impl Kernel for Products<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { gram: Gram { motions, stride, pairs, products, .. }, count } = self;
+        let modes = motions.len() / *stride;
+        let blocks = pairs.len().div_ceil(PAIRS);
+        // A row of motions, and its products in the order of the pairs: lanes beyond the last motion are zero there, and
+        // are overwritten here.
+        let mut row = [0.0; MOST_MOTIONS + WIDTH];
+        let mut line = vec![0.0; blocks * PAIRS + WIDTH];
+        for mode in 0..modes {
+            row[..count].copy_from_slice(&motions[mode * *stride..][..count]);
+            let mut start = 0;
+            for first in 0..count {
+                let factor = V::splat(row[first]);
+                let length = count - first;
+                for block in (0..length).step_by(WIDTH) {
+                    let others = row[first + block..].first_chunk().expect("padded");
+                    let to = line[start + block..].first_chunk_mut().expect("padded");
+                    factor.mul(V::load(others)).store(to);
+                }
+                start += length;
+            }
+            for block in 0..blocks {
+                products[block * modes + mode].copy_from_slice(&line[block * PAIRS..][..PAIRS]);
+            }
+        }
     }
 }

@@ -166,7 +166,7 @@ impl Pencil {
         if self.reduction.count == 0 {
             return self.lead(model);
         }
-        self.gram.resize(&self.reduction);
+        self.gram.resize(level, &self.reduction);
         self.list();
         true
     }

@@ -62,7 +62,7 @@ pub struct Reduction {
     /// Rows that may be motions, those of the model before, and what elimination leaves of them.
     candidates: Vec<f64>,
     before: Vec<f64>,
-    left: Vec<f64>,
+    left: Vec<[f64; WIDTH]>,
     /// Row and column of each pivot; the inverse of the candidates there, column by column, in every lane.
     pivots: Vec<[usize; 2]>,
     inverse: Vec<[f64; WIDTH]>,
@@ -134,7 +134,7 @@ impl Reduction {
             && self.pivots.len().pow(2) == self.inverse.len()
             && self.candidates == self.before;
         let known = same && worth(self.pivots.len());
-        if !(known || self.pivot(elastic.len(), worth)) {
+        if !(known || self.pivot(level, elastic.len(), worth)) {
             self.pivots.clear();
             return false;
         }
@@ -144,17 +144,21 @@ impl Reduction {
             let count = elastic.len();
             let [plain, transposed] = &mut self.full[kind];
             plain.clone_from(full);
-            transposed.clear();
             if full.is_empty() {
+                transposed.clear();
                 continue;
             }
             for (mode, own) in self.own.iter_mut().enumerate() {
                 own[kind + 1] += std::mem::take(&mut plain[mode * count + mode]);
             }
             transposed.resize(count * count, 0.0);
-            for (row, values) in plain.chunks_exact(count).enumerate() {
-                for (column, value) in values.iter().enumerate() {
-                    transposed[column * count + row] = *value;
+            // A few rows at a time, which become pieces of lines of memory.
+            for first in (0..count).step_by(WIDTH) {
+                let rows = first..(first + WIDTH).min(count);
+                for column in 0..count {
+                    for row in rows.clone() {
+                        transposed[column * count + row] = plain[row * count + column];
+                    }
                 }
             }
         }
@@ -168,8 +172,8 @@ impl Reduction {
         self.candidates.clear();
         // Of a translation or rotation, components that are the rounding of the others are none.
         for axes in known.motions.chunks_exact(3 * count) {
-            let least = DEPENDENT * largest(axes).1;
-            let rows = axes.chunks_exact(count).filter(|row| largest(row).1 > least);
+            let least = DEPENDENT * largest(axes);
+            let rows = axes.chunks_exact(count).filter(|row| largest(row) > least);
             rows.for_each(|row| self.candidates.extend(row));
         }
         let apart = self.others.iter().filter(|at| **at < self.elastic.start || **at >= n);
@@ -190,45 +194,41 @@ impl Reduction {
 
     /// Picks independent rows of the candidates, and an elastic coordinate for each: Gaussian elimination with complete
     /// pivoting of rows scaled alike. False as soon as there are too many.
-    fn pivot(&mut self, modes: usize, worth: impl Fn(usize) -> bool) -> bool {
+    fn pivot(&mut self, level: Level, modes: usize, worth: impl Fn(usize) -> bool) -> bool {
+        let width = modes.div_ceil(WIDTH);
         self.left.clear();
-        self.left.extend(&self.candidates);
-        self.pivots.clear();
-        let rows = self.left.len() / modes;
-        // Largest element left of each row, and its place.
-        let mut most = Vec::with_capacity(rows);
-        for row in self.left.chunks_exact_mut(modes) {
-            let largest = largest(row).1.recip();
-            row.iter_mut().for_each(|value| *value *= largest);
-            most.push(self::largest(row));
+        for row in self.candidates.chunks_exact(modes) {
+            let scale = largest(row).recip();
+            let (whole, rest) = row.as_chunks::<WIDTH>();
+            self.left.extend(whole.iter().map(|values| values.map(|value| value * scale)));
+            if !rest.is_empty() {
+                let mut last = [0.0; WIDTH];
+                last.iter_mut().zip(rest).for_each(|(last, value)| *last = value * scale);
+                self.left.push(last);
+            }
         }
-        let mut open: Vec<usize> = (0..rows).collect();
-        let mut pivot_row = vec![0.0; modes];
+        self.pivots.clear();
+        let mut open: Vec<usize> = (0..self.left.len() / width).collect();
+        // Largest element left of each row.
+        let mut most: Vec<f64> =
+            self.left.chunks_exact(width).map(|row| largest(row.as_flattened())).collect();
         while let Some((at, &row)) =
-            open.iter().enumerate().max_by(|(_, a), (_, b)| most[**a].1.total_cmp(&most[**b].1))
+            open.iter().enumerate().max_by(|(_, a), (_, b)| most[**a].total_cmp(&most[**b]))
         {
-            let (column, size) = most[row];
-            if !(size > DEPENDENT) {
+            if !(most[row] > DEPENDENT) {
                 break;
             }
             if self.pivots.len() == MOST_MOTIONS || !worth(self.pivots.len() + 1) {
                 return false;
             }
             open.remove(at);
+            let of_row = &self.left[row * width..][..width];
+            let is_most = |value: &f64| value.abs() == most[row];
+            let column = of_row.iter().flatten().position(is_most).unwrap_or(0);
             self.pivots.push([row, column]);
-            pivot_row.copy_from_slice(&self.left[row * modes..][..modes]);
-            for &other in &open {
-                let values = &mut self.left[other * modes..][..modes];
-                let factor = values[column] / pivot_row[column];
-                if factor == 0.0 {
-                    continue;
-                }
-                for (value, pivot) in values.iter_mut().zip(&pivot_row) {
-                    *value -= factor * pivot;
-                }
-                values[column] = 0.0;
-                most[other] = largest(values);
-            }
+            let pivot = of_row.to_vec();
+            let left = &mut self.left;
+            level.run(Clear { left, pivot: &pivot, column, open: &open, most: &mut most });
         }
         self.pivots.sort_unstable();
         let c = self.pivots.len();
@@ -340,15 +340,17 @@ impl Reduction {
 
     /// Whether the reduced form is the model: rows and columns times a vector of signs on the elastic coordinates.
     fn complete(&mut self, level: Level, model: &Model) -> bool {
-        let (c, first) = (self.count, self.elastic.start);
-        let size = c + self.others.len();
+        let c = self.count;
+        let (size, modes) = (c + self.others.len(), self.elastic.len());
         let sign = |at: usize| if (at * at + at / 3) % 5 < 2 { -1.0 } else { 1.0 };
+        let signs: Vec<f64> = self.elastic.clone().map(sign).collect();
         // What the motions see of the signs, and could see at most.
-        let mut seen = vec![[0.0; 2]; c];
-        for (mode, row) in self.motions.chunks_exact(self.stride).enumerate() {
-            for (seen, motion) in seen.iter_mut().zip(row) {
-                seen[0] += motion * sign(first + mode);
-                seen[1] += motion.abs();
+        let mut seen = [vec![0.0; self.stride], vec![0.0; self.stride]];
+        for (row, sign) in self.motions.chunks_exact(self.stride).zip(&signs) {
+            let [sums, sizes] = &mut seen;
+            for ((sum, size), motion) in sums.iter_mut().zip(sizes).zip(row) {
+                *sum += motion * sign;
+                *size += motion.abs();
             }
         }
         let difference = |value: f64, [sum, size]: [f64; 2]| match value == sum {
@@ -357,20 +359,21 @@ impl Reduction {
         };
         // All three at once, at a typical frequency: what is left out of one is not made up for by another.
         let logarithms: f64 = self.own.iter().map(|own| own[2].ln()).sum();
-        let square = (logarithms / self.own.len() as f64).exp();
+        let square = (logarithms / modes as f64).exp();
         let powers = [square, square.sqrt(), 1.0];
         let at = |entry: [f64; 3]| entry[0] * powers[0] + entry[1] * powers[1] + entry[2];
-        let mut signs = Vec::with_capacity(model.coordinates());
         let mut products = [vec![0.0; model.coordinates()], vec![0.0; model.coordinates()]];
+        let mut scaled = vec![0.0; model.coordinates()];
         for (matrix, power) in
             [&model.mass, &model.damping, &model.stiffness].into_iter().zip(powers)
         {
-            let of = |at| if self.elastic.contains(&at) { power * sign(at) } else { 0.0 };
-            signs.clear();
-            signs.extend((0..model.coordinates()).map(of));
-            level.run(TimesSigns { matrix, signs: &signs, products: &mut products });
+            let elastic = scaled[self.elastic.clone()].iter_mut();
+            elastic.zip(&signs).for_each(|(scaled, sign)| *scaled = power * sign);
+            level.run(TimesSigns { matrix, signs: &scaled, products: &mut products });
         }
         let mut most = 0.0_f64;
+        let ones = vec![1.0; modes];
+        let mut expected: Vec<[f64; 2]> = Vec::with_capacity(modes);
         for (transposed, product) in [false, true].into_iter().zip(&products) {
             let entry = |i: usize, j: usize| match transposed {
                 false => at(self.entries[i * size + j]),
@@ -380,31 +383,28 @@ impl Reduction {
             let force = |i: usize| {
                 (0..c).fold([0.0; 2], |[sum, most], j| {
                     let entry = entry(i, j);
-                    [sum + entry * seen[j][0], most + entry.abs() * seen[j][1]]
+                    [sum + entry * seen[0][j], most + entry.abs() * seen[1][j]]
                 })
             };
-            let forces: Vec<[f64; 2]> = (0..c).map(force).collect();
-            let full = |mode: usize| {
-                let sum = |kind: usize| {
-                    let matrix = &self.full[kind][usize::from(transposed)];
-                    let row = matrix.chunks_exact(self.elastic.len()).nth(mode).unwrap_or_default();
-                    row.iter().enumerate().fold([0.0; 2], |[sum, most], (at, value)| {
-                        [sum + value * sign(first + at), most + value.abs()]
-                    })
-                };
-                let [damping, stiffness] = [sum(0), sum(1)];
-                [0, 1].map(|i| damping[i] * powers[1] + stiffness[i])
-            };
-            for mode in 0..self.elastic.len() {
-                let own = at(self.own[mode]);
-                let row = &self.motions[mode * self.stride..][..c];
-                let full = full(mode);
-                let start = [own * sign(first + mode) + full[0], own.abs() + full[1]];
-                let expected = row
-                    .iter()
-                    .zip(&forces)
-                    .fold(start, |[sum, most], (b, f)| [sum + b * f[0], most + b.abs() * f[1]]);
-                let difference = difference(product[first + mode], expected);
+            let mut forces = [vec![0.0; self.stride], vec![0.0; self.stride]];
+            for i in 0..c {
+                [forces[0][i], forces[1][i]] = force(i);
+            }
+            expected.clear();
+            expected.extend(self.own.iter().zip(&signs).map(|(own, sign)| {
+                let own = at(*own);
+                [own * sign, own.abs()]
+            }));
+            let to = &mut expected;
+            for (full, factor) in self.full.iter().zip(&powers[1..]) {
+                let rows = &full[usize::from(transposed)];
+                let (values, sizes, factor) = (&signs, &ones, *factor);
+                level.run(TimesRows { rows, values, sizes, factor, to });
+            }
+            let [values, sizes] = &forces;
+            level.run(TimesRows { rows: &self.motions, values, sizes, factor: 1.0, to });
+            for (value, expected) in product[self.elastic.clone()].iter().zip(&expected) {
+                let difference = difference(*value, *expected);
                 if !(difference <= LEFT_OUT) {
                     return false;
                 }
@@ -423,10 +423,56 @@ impl Reduction {
     }
 }
 
-/// Place and modulus of the largest element.
-fn largest(row: &[f64]) -> (usize, f64) {
-    let most = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    (row.iter().position(|value| value.abs() == most).unwrap_or(0), most)
+/// Modulus of the largest element.
+fn largest(row: &[f64]) -> f64 {
+    // Several at a time, so that one need not wait for the other.
+    let mut most = [0.0_f64; WIDTH];
+    let (whole, rest) = row.as_chunks::<WIDTH>();
+    for values in whole.iter().map(|values| &values[..]).chain([rest]) {
+        for (most, value) in most.iter_mut().zip(values) {
+            *most = most.max(value.abs());
+        }
+    }
+    most.into_iter().fold(0.0, f64::max)
+}
+
+/// Subtracts from open rows what makes their element in the pivot's column zero; the largest that is left of each.
+struct Clear<'a> {
+    left: &'a mut [[f64; WIDTH]],
+    pivot: &'a [[f64; WIDTH]],
+    column: usize,
+    open: &'a [usize],
+    most: &'a mut [f64],
+}
+
+impl Kernel for Clear<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { left, pivot, column, open, most } = self;
+        let (block, lane) = (column / WIDTH, column % WIDTH);
+        for &row in open {
+            let values = &mut left[row * pivot.len()..][..pivot.len()];
+            let factor = values[block][lane] / pivot[block][lane];
+            if factor == 0.0 {
+                continue;
+            }
+            let factor = V::splat(factor);
+            for i in 0..pivot.len() {
+                let value = V::load(&values[i]);
+                factor.negative_mul_add(V::load(&pivot[i]), value).store(&mut values[i]);
+            }
+            values[block][lane] = 0.0;
+            let mut largest = V::splat(0.0);
+            for i in 0..pivot.len() {
+                largest = largest.max(V::load(&values[i]).abs());
+            }
+            let mut lanes = [0.0; WIDTH];
+            largest.store(&mut lanes);
+            most[row] = lanes.into_iter().fold(0.0, f64::max);
+        }
+    }
 }
 
 /// A matrix `A` becomes `Fᵀ A F`, in every lane; all column by column.
@@ -506,6 +552,46 @@ impl Kernel for Through<'_> {
             }
             sum.store(&mut to[0]);
             size.store(&mut to[1]);
+        }
+    }
+}
+
+/// Adds the products of rows with `values`, and of their moduli with `sizes`, each times `factor`.
+struct TimesRows<'a> {
+    rows: &'a [f64],
+    values: &'a [f64],
+    sizes: &'a [f64],
+    factor: f64,
+    to: &'a mut [[f64; 2]],
+}
+
+impl Kernel for TimesRows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { rows, values, sizes, factor, to } = self;
+        let ((values, last_values), (sizes, last_sizes)) =
+            (values.as_chunks::<WIDTH>(), sizes.as_chunks::<WIDTH>());
+        let width = values.len() * WIDTH + last_values.len();
+        for (row, to) in rows.chunks_exact(width).zip(to) {
+            let (row, last) = row.as_chunks::<WIDTH>();
+            let (mut sum, mut size) = (V::splat(0.0), V::splat(0.0));
+            for i in 0..row.len() {
+                let row = V::load(&row[i]);
+                sum = row.mul_add(V::load(&values[i]), sum);
+                size = row.abs().mul_add(V::load(&sizes[i]), size);
+            }
+            let mut lanes = [[0.0; WIDTH]; 2];
+            sum.store(&mut lanes[0]);
+            size.store(&mut lanes[1]);
+            for i in 0..last.len() {
+                lanes[0][i] += last[i] * last_values[i];
+                lanes[1][i] += last[i].abs() * last_sizes[i];
+            }
+            for (to, lanes) in to.iter_mut().zip(lanes) {
+                *to += factor * lanes.iter().sum::<f64>();
+            }
         }
     }
 }
