@@ -14,6 +14,7 @@ use std::path::Path;
 use std::time::Instant;
 use tvse::campaign::Evaluator;
 use tvse::dispersion::Sampler;
+use tvse::dynamics::Model;
 use tvse::io::scenario::{self, Reach};
 use tvse::modal::Solver;
 use tvse::modal::spectrum::lanes::{Kernel, Level, Vector, WIDTH};
@@ -121,14 +122,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "variant,flight_time_s,case,states,file,structured_s,some_s,all_s,dense_s,determinants,poles,bound,certificate,operations,peak"
     );
     let peak = peak();
+    let mut before: Vec<(Base, Model)> = Vec::new();
     for case in 0..cases.parse()? {
         let mut failed = None;
         evaluator.visit(1, case, |view| {
-            let result = || -> Result<(), Box<dyn std::error::Error>> {
+            let mut result = || -> Result<(), Box<dyn std::error::Error>> {
                 let (variant, time) = (view.evaluation.variant, view.evaluation.flight_time);
                 let name = &definition.variants[variant].name;
                 let nominal = &evaluator.times[time].variants[variant].nominal;
-                let mut solver = Solver::new(view.model.coordinates());
+                let size = view.model.coordinates();
+                let mut solver = Solver::new(size);
                 let base = Base::of(nominal, &mut solver)?;
                 let mut spectrum = Spectrum::new();
                 let state = solver.state_matrix(view.model)?.clone();
@@ -136,23 +139,33 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 let bytes: Vec<u8> = state.iter().flat_map(|v| v.to_le_bytes()).collect();
                 std::fs::write(Path::new(folder).join(&file), bytes)?;
                 let certified = spectrum.solve(&base, view.model);
-                // Each time after another model, so that nothing kept of this one helps.
+                let mode = evaluator.times[time].variants[variant].references[0].predict(view.model);
+                // Each time after the model that a campaign solves before it in the same buffers: that of the
+                // variant before, or of another vehicle; and with the model just written, as there.
                 let spectrum = RefCell::new(spectrum);
+                let model = RefCell::new(view.model.clone());
+                let last = before.iter().position(|(_, model)| model.coordinates() == size);
+                let (other_base, other_model) = match last {
+                    Some(last) => before.swap_remove(last),
+                    None => (base.clone(), nominal.clone()),
+                };
                 let other = || {
-                    std::hint::black_box(spectrum.borrow_mut().solve(&base, nominal).is_ok());
+                    let mut spectrum = spectrum.borrow_mut();
+                    let found = spectrum.solve_near(&other_base, &other_model, &[mode], 4);
+                    std::hint::black_box(found.is_ok());
+                    *model.borrow_mut() = view.model.clone();
                 };
                 let structured = least_after(other, || {
-                    let mut spectrum = spectrum.borrow_mut();
-                    std::hint::black_box(spectrum.solve(&base, view.model).is_ok());
+                    let (mut spectrum, model) = (spectrum.borrow_mut(), model.borrow());
+                    std::hint::black_box(spectrum.solve(&base, &model).is_ok());
                 });
-                let mode = evaluator.times[time].variants[variant].references[0].predict(view.model);
                 let with_vectors = |near: Option<usize>| {
                     let mut given = 0;
                     let time = least_after(other, || {
-                        let mut spectrum = spectrum.borrow_mut();
+                        let (mut spectrum, model) = (spectrum.borrow_mut(), model.borrow());
                         let found = match near {
-                            Some(count) => spectrum.solve_near(&base, view.model, &[mode], count),
-                            None => spectrum.solve(&base, view.model),
+                            Some(count) => spectrum.solve_near(&base, &model, &[mode], count),
+                            None => spectrum.solve(&base, &model),
                         };
                         let mut poles: Vec<_> = found.iter().flatten().map(|p| p.root).collect();
                         if let Some(count) = near {
@@ -160,7 +173,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                             poles.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
                             poles.truncate(count);
                         }
-                        given = std::hint::black_box(spectrum.vectors(view.model, &poles).len());
+                        given = std::hint::black_box(spectrum.vectors(&model, &poles).len());
                     });
                     // A model that is not reduced has none from its structure.
                     if given > 0 { time } else { f64::NAN }
@@ -181,6 +194,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 });
                 let (states, count) = (state.nrows(), poles.len());
                 let time = definition.flight_times_s[time];
+                before.push((base, view.model.clone()));
                 let (effort, operations) = (spectrum.evaluations(), spectrum.operations(view.model));
                 println!("{name},{time},{case},{states},{file},{structured:e},{some:e},{all:e},{dense:e},{effort},{count},{bound:e},{kind},{operations:e},{peak:e}");
                 Ok(())
