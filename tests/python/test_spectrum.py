@@ -163,6 +163,17 @@ def test_repeated_poles_stay_what_they_are_under_the_full_jet_matrix(many):
     assert proven["jet_damping"] == ["residual"]
 
 
+def test_a_package_with_as_many_modes_as_its_stick_gives_is_taken(many):
+    tvse("modes", many / "vehicle/stick.toml", "-o", many / "short/modes", "--count", 236)
+    shutil.copytree(many / "vehicle", many / "short", dirs_exist_ok=True, ignore=shutil.ignore_patterns("modes"))
+    text = (many / "run.toml").read_text().replace('"vehicle"', '"short"').replace("cases = 8", "cases = 1")
+    (many / "short.toml").write_text(text)
+    tvse("run", many / "short.toml", "--output", many / "short_run")
+    modes = pd.read_parquet(many / "short_run/tables/modes.parquet")
+    proven = modes.groupby("variant")["certificate"].unique().map(list).to_dict()
+    assert proven == {"no_jet_damping": ["discs"], "jet_damping": ["near"]}
+
+
 def test_poles_near_the_modes_of_interest_are_those_of_all(many):
     out = tvse("run", many / "run.toml", "--audit", 3, "--output", many / "near")
     assert ": agreed" in out

@@ -17,8 +17,12 @@ const NORMALISATION: f64 = 1e-5;
 const WHOLE_MASS: f64 = 0.02;
 /// Departure of `Σ m φ² + J ψ²` from 1 that lumping explains.
 const LUMPING: f64 = 0.15;
-/// Modes from the lowest whose waves are long beside the distance of grids.
+/// Modes from the lowest whose waves are long beside the distance of grids: of the stick model of the reference vehicle
+/// their sums are 1.00 to 1.04, of the first hundred up to 1.9, of 236 up to 2.9.
 const LONG_WAVES: usize = 30;
+/// Sum of a mode that changes sign from grid to grid: an element of a rod weighs m lumped, `m/6 (2 − 1 − 1 + 2) = m/3` by
+/// linear shapes.
+const SHORT_WAVE: f64 = 3.0;
 /// Problems of one table that are reported one by one.
 pub(super) const REPORTED: usize = 20;
 /// A check of the tables in progress.
@@ -254,7 +258,7 @@ impl Check<'_> {
             if !((lumped.max() / set.body.mass_kg - 1.0).abs() <= WHOLE_MASS) {
                 continue;
             }
-            // Lumped masses see short waves badly: beyond the long ones a factor of two.
+            // Lumped masses see short waves badly.
             let mut order: Vec<f64> = set.modes.iter().map(|mode| mode.frequency_hz).collect();
             order.sort_by(f64::total_cmp);
             let long = order.get(LONG_WAVES).copied().unwrap_or(f64::INFINITY);
@@ -265,7 +269,7 @@ impl Check<'_> {
                             + grid.inertia_kg_m2.dot(&psi.component_mul(psi))
                     })
                     .sum();
-                let coarse = mode.frequency_hz >= long && (0.5..=2.0).contains(&sum);
+                let coarse = mode.frequency_hz >= long && (0.5..=SHORT_WAVE).contains(&sum);
                 if !(coarse || (sum - 1.0).abs() <= LUMPING) {
                     let found = format!(
                         "{sum:.4} kg on the masses of the grids for mode `{}` at {} s",
