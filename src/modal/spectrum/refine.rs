@@ -151,7 +151,7 @@ impl Kernel for Find<'_> {
             let at = Frequencies::<V>::new(poles, 1.0);
             let full = Some([s, Complex::splat(1.0, 0.0)]);
             pencil.apply::<V>(&at, full, false, right, &mut core[0], residual);
-            // Over wᵀ L₀' v, which is one, from which yᵀ L' x differs by what is left out of x and y.
+            // Over wᵀ L₀' v, which is one, for yᵀ L' x, which is near it.
             let change = dot::<V>(left, residual);
             s = s.sub(change);
             if step == 0 {
@@ -190,6 +190,12 @@ impl Kernel for Find<'_> {
             }
         }
         s.store(poles);
+        // What yᵀ L' x has become: nothing near where two poles and their vectors meet.
+        let derivative = Frequencies::<V>::slope(s);
+        let full = Some([Complex::splat(1.0, 0.0), Complex::splat(0.0, 0.0)]);
+        pencil.apply::<V>(&derivative, full, false, right, &mut core[0], residual);
+        let over = dot::<V>(left, residual).reciprocal();
+        V::load(bound).mul(over.square().sqrt()).store(bound);
         for lane in 0..WIDTH {
             if starts.im[lane] == 0.0 {
                 poles.im[lane] = 0.0;

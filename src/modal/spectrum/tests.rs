@@ -522,6 +522,38 @@ fn a_full_part_as_strong_as_the_distance_of_poles_is_not_certified_wrongly() {
 
 #[test]
 #[cfg_attr(miri, ignore = "hours under Miri")]
+fn poles_that_a_full_part_makes_coalesce_keep_their_bounds() {
+    let plain = attached(60, 0.2, false);
+    let omega = |mode: usize| plain.stiffness[(mode, mode)].sqrt();
+    let gap = (omega(31) - omega(30)).abs();
+    let mut certified = 0;
+    for step in 0..=60 {
+        // Where damping couples two oscillators by their distance, their poles meet.
+        let coupling = gap * (0.4 + 0.02 * f64::from(step));
+        let mut case = plain.clone();
+        for at in [[30, 31], [31, 30]] {
+            case.damping[(at[0], at[1])] += coupling;
+            case.interface.add_full(0, at, coupling);
+        }
+        let mut spectrum = Spectrum::new();
+        let Ok(found) = spectrum.solve(&base(&case), &case) else { continue };
+        assert!(spectrum.is_refined());
+        certified += 1;
+        let mut solver = Solver::new(63);
+        let exact: Vec<(c64, f64)> =
+            dense(&case).into_iter().map(|s| (s, solver.pair(&case, s).bound)).collect();
+        assert_eq!(found.len(), exact.len());
+        for pole in found {
+            let apart = |(s, bound): &(c64, f64)| (s - pole.root).norm() - 2.0 * bound;
+            let off = exact.iter().map(apart).fold(f64::INFINITY, f64::min);
+            assert!(off <= pole.bound + 1e-12 * pole.root.norm(), "{step}: {pole:?} {off:.1e}");
+        }
+    }
+    assert!(certified > 20, "{certified}");
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "hours under Miri")]
 fn numbers_that_are_not_finite_are_never_certified_in_reduced_models() {
     for full in [false, true] {
         let nominal = base(&attached(40, 0.0, full));
