@@ -13,6 +13,9 @@ use faer::c64;
 const STILL: f64 = 0.8;
 /// Steps before a pole is given up: where two are as near as they are coupled each leaves half of what was.
 const MOST_STEPS: usize = 40;
+/// Steps in which a pole rests only if each leaves a small part of what was: vectors are near those of the start then, and
+/// `yᵀ L' x` is near one.
+const FEW: usize = 6;
 /// Distance of the point of the factors from the pole of L₀, relative.
 const ASIDE: f64 = 1e-12;
 /// Relative bound of a pole that is good enough.
@@ -146,6 +149,7 @@ impl Kernel for Find<'_> {
         let mut s = start;
         let mut last = V::splat(f64::MAX);
         let mut rested = [false; WIDTH];
+        let mut slow = false;
         for step in 0..MOST_STEPS {
             s.store(poles);
             let at = Frequencies::<V>::new(poles, 1.0);
@@ -169,6 +173,7 @@ impl Kernel for Find<'_> {
             for lane in 0..WIDTH {
                 // Known well enough, or no better than before.
                 let still = step > 1 && !(bound[lane] < STILL * before[lane]);
+                slow |= still || step >= FEW;
                 rested[lane] |= step > 0 && (bound[lane] <= RESTED * moduli[lane] || still);
             }
             last = doubt;
@@ -190,12 +195,14 @@ impl Kernel for Find<'_> {
             }
         }
         s.store(poles);
-        // What yᵀ L' x has become: nothing near where two poles and their vectors meet.
-        let derivative = Frequencies::<V>::slope(s);
-        let full = Some([Complex::splat(1.0, 0.0), Complex::splat(0.0, 0.0)]);
-        pencil.apply::<V>(&derivative, full, false, right, &mut core[0], residual);
-        let over = dot::<V>(left, residual).reciprocal();
-        V::load(bound).mul(over.square().sqrt()).store(bound);
+        if slow {
+            // What yᵀ L' x has become: near nothing where two poles and their vectors meet.
+            let derivative = Frequencies::<V>::slope(s);
+            let full = Some([Complex::splat(1.0, 0.0), Complex::splat(0.0, 0.0)]);
+            pencil.apply::<V>(&derivative, full, false, right, &mut core[0], residual);
+            let over = dot::<V>(left, residual).reciprocal();
+            V::load(bound).mul(over.square().sqrt()).store(bound);
+        }
         for lane in 0..WIDTH {
             if starts.im[lane] == 0.0 {
                 poles.im[lane] = 0.0;
