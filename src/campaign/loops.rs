@@ -10,7 +10,7 @@ use super::{Failure, FailureKind};
 use crate::dynamics::servo::{self, Row};
 use crate::dynamics::{DrawnVehicle, Effects, Feedback, Model, Plant, Servo};
 use crate::margins::{self, Assessment, AxisMargins, Peak, assess};
-use crate::modal::spectrum::Base;
+use crate::modal::spectrum::{Base, Transfer};
 use crate::modal::{Reference, Response, Solver};
 use crate::vehicle::{ModeSet, Vehicle};
 use nalgebra::{Complex, DMatrix, Matrix3};
@@ -58,6 +58,24 @@ pub struct OpenLoop {
     sign: f64,
     /// Every nominal pole, from which those of cases are found.
     base: Option<Base>,
+}
+
+/// What sensors see of the commands.
+enum Sensed {
+    /// Through the interface of the model.
+    Interface(Box<Transfer>),
+    /// From its state space.
+    States(Box<Response>),
+}
+
+impl Sensed {
+    /// The responses at these frequencies, rad/s, signals × axes.
+    fn at(&mut self, points: &[Complex<f64>]) -> Vec<DMatrix<Complex<f64>>> {
+        match self {
+            Self::Interface(transfer) => transfer.at(points),
+            Self::States(response) => response.at(points),
+        }
+    }
 }
 
 impl OpenLoop {
@@ -122,11 +140,18 @@ impl OpenLoop {
         // the balanced states, it would lose half of its digits.
         let attitudes: Vec<usize> = (0..rows.len()).filter(|&row| !rows[row].rate).collect();
         rows.iter_mut().for_each(|row| row.rate = true);
-        let space = solver
-            .state_space(model, layout.translation(), &inputs, &rows)
-            .map_err(|error| Failure::from(&error))?;
-        let mut response = Response::new(&space.a, &space.b, &space.c, &space.d)
-            .map_err(|error| Failure::from(&error))?;
+        let observed = model.observed(layout.translation());
+        let structured = self.base.as_ref().and_then(|_| Transfer::new(&observed, &inputs, &rows));
+        let mut sensed = match structured {
+            Some(transfer) => Sensed::Interface(Box::new(transfer)),
+            None => {
+                let space = solver
+                    .state_space(&observed, &inputs, &rows)
+                    .map_err(|error| Failure::from(&error))?;
+                let response = Response::new(&space.a, &space.b, &space.c, &space.d);
+                Sensed::States(Box::new(response.map_err(|error| Failure::from(&error))?))
+            }
+        };
         let one = |s: Complex<f64>, mut sensed: DMatrix<Complex<f64>>| {
             for &row in &attitudes {
                 sensed.row_mut(row).iter_mut().for_each(|attitude| *attitude /= s);
@@ -142,7 +167,7 @@ impl OpenLoop {
             }
         };
         let g = |points: &[Complex<f64>]| {
-            points.iter().zip(response.at(points)).map(|(s, sensed)| one(*s, sensed)).collect()
+            points.iter().zip(sensed.at(points)).map(|(s, sensed)| one(*s, sensed)).collect()
         };
         let wanted: Vec<f64> = wanted_hz.iter().map(|hz| TAU * hz).collect();
         assess(g, &poles, closed, &wanted, &plan.settings)

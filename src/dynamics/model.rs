@@ -4,6 +4,7 @@
 
 use super::Interface;
 use faer::Mat;
+use std::ops::Range;
 
 /// The matrices of one linear model in SI units, N×N each.
 ///
@@ -89,6 +90,18 @@ impl Model {
         for state in second_order..self.coordinates() {
             self.damping[(state, state)] = 1.0;
         }
+    }
+
+    /// The model in which the rigid rotation is kept, null or not, as outputs may read it; the `translation` is left out
+    /// where it is null.
+    pub fn observed(&self, translation: Range<usize>) -> Self {
+        let mut observed = self.clone();
+        let n = self.second_order;
+        observed.null_motion = None;
+        observed.null_states.retain(|state| {
+            translation.contains(state) || translation.contains(&state.wrapping_sub(n))
+        });
+        observed
     }
 
     /// Whether every entry is finite.

@@ -13,7 +13,6 @@ use faer::linalg::cholesky::llt;
 use faer::linalg::evd::{self, ComputeEigenvectors, EvdParams};
 use faer::{Mat, MatMut, MatRef, Par, Spec, c64};
 use nalgebra::DMatrix;
-use std::ops::Range;
 
 /// Why a solve failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -193,25 +192,18 @@ impl Solver {
     }
 
     /// The state space of the model driven by `E w` on its right-hand side (`inputs` is E, coordinates ×
-    /// inputs) with the outputs `rows`, linear in coordinates or rates. The rigid rotation is kept, null or not, as
-    /// outputs may read it; the translation is left out where it is null.
+    /// inputs) with the outputs `rows`, linear in coordinates or rates, which read no null state.
     ///
     /// # Errors
     /// See [`Error`].
     pub fn state_space(
         &mut self,
         model: &Model,
-        translation: Range<usize>,
         inputs: &DMatrix<f64>,
         rows: &[Row],
     ) -> Result<StateSpace, Error> {
         let n = model.second_order;
-        let mut observed = model.clone();
-        observed.null_motion = None;
-        observed.null_states.retain(|state| {
-            translation.contains(state) || translation.contains(&state.wrapping_sub(n))
-        });
-        self.build_state(&observed)?;
+        self.build_state(model)?;
         let mut accelerations = Mat::from_fn(n, inputs.ncols(), |i, j| inputs[(i, j)]);
         llt::solve::solve_in_place(
             self.factor.as_ref().submatrix(0, 0, n, n),
@@ -230,7 +222,7 @@ impl Solver {
             for &(coordinate, factor) in &row.entries {
                 let state = coordinate + if row.rate { n } else { 0 };
                 let kept = self.kept.binary_search(&state);
-                c[(output, kept.expect("outputs read no translation"))] += factor;
+                c[(output, kept.expect("outputs read no null state"))] += factor;
             }
         }
         let d = DMatrix::zeros(rows.len(), inputs.ncols());

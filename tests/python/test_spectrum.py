@@ -190,6 +190,43 @@ def test_poles_near_the_modes_of_interest_are_those_of_all(many):
     assert "bit for bit as stored" in tvse("replay", many / "near", "--case", 5)
 
 
+def test_margins_through_the_interface_are_those_of_the_state_space(many):
+    # Without the case jet matrix and with many modes, responses of a structured run do not come from a state space.
+    tvse("modes", many / "vehicle/stick.toml", "-o", many / "loops/modes", "--count", 98)
+    shutil.copytree(many / "vehicle", many / "loops", dirs_exist_ok=True, ignore=shutil.ignore_patterns("modes"))
+    shutil.copy(ROOT / "dispersions/closed-loop.toml", many / "loops.dispersion.toml")
+    (many / "loops.toml").write_text("""
+vehicle = "loops"
+dispersion = "loops.dispersion.toml"
+cases = 3
+seed = 7
+flight_times_s = [105.0]
+modes = ["tvse"]
+gimballed = ["booster.*"]
+
+[margins]
+variants = ["closed"]
+
+[[variant]]
+name = "closed"
+case_jet_damping = false
+nozzle_jet_damping = "equation-13"
+rigid_body = true
+slosh = true
+aerodynamics = true
+feedback = "closed"
+""")
+    tables = []
+    for solver in ("structured", "dense"):
+        tvse("run", many / "loops.toml", "--solver", solver, "--output", many / f"loops_{solver}")
+        tables.append(pd.read_parquet(many / f"loops_{solver}/tables/margins.parquet"))
+    ours, theirs = tables
+    assert len(ours) == len(theirs) == 12 and not ours.equals(theirs)
+    for name, allowed in [("phase_margin_deg", 1e-6), ("gain_margin_high_db", 1e-7), ("delay_margin_s", 1e-9)]:
+        assert ours[name].notna().any() and (ours[name].isna() == theirs[name].isna()).all()
+        assert (ours[name] - theirs[name]).abs().max() < allowed, name
+
+
 def test_many_modes_give_the_same_bytes_for_any_number_of_threads(many):
     for jobs in (1, 2):
         tvse("run", many / "run.toml", "--jobs", jobs, "--output", many / f"jobs{jobs}")

@@ -14,9 +14,11 @@ mod refine;
 mod scaled;
 mod secular;
 mod sparsity;
+mod transfer;
 
 pub use predict::Base;
 pub use secular::{Bounded, Uncertain};
+pub use transfer::Transfer;
 
 use self::lanes::{Level, WIDTH};
 use self::pencil::Pencil;

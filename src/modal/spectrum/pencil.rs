@@ -396,6 +396,11 @@ impl Pencil {
         self.order.len() + self.reduction.elastic.len()
     }
 
+    /// The coordinate of the model of each element of a vector.
+    pub fn coordinates(&self) -> Vec<usize> {
+        self.order.iter().copied().chain(self.reduction.elastic.clone()).collect()
+    }
+
     /// The right and left vector of a lane in the coordinates of the model, for the pole `s`.
     pub fn unpack(
         &self,

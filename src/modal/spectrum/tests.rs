@@ -1,4 +1,7 @@
 use super::*;
+use crate::dynamics::servo::Row;
+use crate::modal::Response;
+use nalgebra::DMatrix;
 
 /// Modes and gimbal-like coordinates with coupling in mass and thrust.
 fn model(frequencies: &[f64], coupling: f64, thrust: f64) -> Model {
@@ -573,4 +576,36 @@ fn numbers_that_are_not_finite_are_never_certified_in_reduced_models() {
             }
         }
     }
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "hours under Miri")]
+fn the_response_through_the_interface_is_that_of_the_state_space() {
+    let model = attached(60, 0.2, false);
+    // Forces on both gimbals and into the state; signals of many modes, of a gimbal and of the state.
+    let mut inputs = DMatrix::zeros(63, 3);
+    for (input, at) in [60, 61, 62].into_iter().enumerate() {
+        inputs[(at, input)] = 1.0 + input as f64;
+    }
+    let modes = |phase: f64| (0..60).map(move |mode| (mode, (0.7 * mode as f64 + phase).sin()));
+    let mut rows: Vec<Row> = [(0.0, false), (1.0, true), (2.0, true)]
+        .map(|(phase, rate)| Row { entries: modes(phase).collect(), rate })
+        .to_vec();
+    rows.push(Row { entries: vec![(60, 2.0), (3, -1.0)], rate: true });
+    let mut transfer = Transfer::new(&model, &inputs, &rows).expect("reduced");
+    let space = Solver::new(63).state_space(&model, &inputs, &rows).expect("regular");
+    let mut response = Response::new(&space.a, &space.b, &space.c, &space.d).expect("finite");
+    let points: Vec<c64> = (0..203)
+        .map(|i| c64::new(if i % 7 == 0 { 0.1 } else { 0.0 }, 0.01 * 1.05_f64.powi(i)))
+        .chain([c64::new(0.5, 0.0), c64::new(0.3, -2.0)])
+        .collect();
+    for ((s, found), expected) in points.iter().zip(transfer.at(&points)).zip(response.at(&points))
+    {
+        let off = (&found - &expected).norm();
+        assert!(off <= 1e-11 * expected.norm(), "{s}: {off:.1e} of {:.1e}", expected.norm());
+        assert_eq!(found, transfer.at(&[*s])[0]);
+    }
+    // With a full part there is no interface to go through.
+    assert!(Transfer::new(&attached(60, 0.2, true), &inputs, &rows).is_none());
+    assert!(Transfer::new(&attached(12, 0.2, false), &inputs, &rows).is_none());
 }
